@@ -43,7 +43,7 @@ fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 
         tile.advance(replicate, SAMPLES);
     }
     let display = Display::default();
-    (0..COLUMNS.len()).map(|x| display.levels_8(film.pixel(x, 0, mix))).collect()
+    (0..COLUMNS.len()).map(|x| display.to_8()(film.pixel(x, 0, mix))).collect()
 }
 
 /// Compares 16 columns (262,144 pixels) of the picture in the file `ZERKALO_PICTURE`. `zerkalo

@@ -47,7 +47,7 @@ fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: u
         }
         None => {
             let (x, y) = (x as u32, y as u32);
-            tile.record_bad(InvalidSample { index, replicate: replicate as u8, y, x });
+            tile.bad.record(InvalidSample { index, replicate: replicate as u8, y, x });
         }
     }
 }

@@ -115,16 +115,6 @@ pub struct Checkpoint {
     film: Film,
 }
 
-/// Render that was restored from a checkpoint.
-pub(super) struct Resumed {
-    pub state: RenderState,
-    pub schedule: Schedule,
-    /// Seconds of rendering until the checkpoint, over all runs of the program.
-    pub seconds: f64,
-    /// `true` if light weights or display transform differ from those of the checkpoint.
-    pub is_relit: bool,
-}
-
 impl Checkpoint {
     /// Reads the checkpoint at `path`. Fails if the file cannot be read, is no checkpoint, or is
     /// damaged.
@@ -145,14 +135,15 @@ impl Checkpoint {
         SampleSettings { seed: self.header.film.seed, kind }
     }
 
-    /// Compiles the checkpoint's scene, restores the render, and relights it as `scene`. Fails if
-    /// the samples are not valid for `scene` and `options`.
+    /// Compiles the checkpoint's scene, restores the render, and relights it as `scene`. The noise
+    /// estimates are those of the checkpoint's light weights and display transform. Fails if the
+    /// samples are not valid for `scene` and `options`.
     pub(super) fn resume(
         self,
         scene: &Arc<Scene>,
         options: &Options,
         settings: Settings,
-    ) -> Result<Resumed, FileError> {
+    ) -> Result<(RenderState, Schedule), FileError> {
         self.check_options(scene, options)?;
         let foreign = "name the scene and its files as they were, or render without --resume";
         let same = scene.to_text() == self.inputs.scene;
@@ -180,9 +171,6 @@ impl Checkpoint {
             let what = "it is of another scene, which differs in more than its lights";
             return Err(self.error(what, foreign));
         }
-        let is_relit =
-            state.weights != self.header.weights || state.display() != self.header.display;
-        let seconds = seconds_of(&self.header);
         let encoded = self.header.chunks.get(&SCHEDULE).map_or(&[][..], Vec::as_slice);
         let counts: Vec<_> = (0..self.film.tile_count()).map(|i| self.film.counts(i)).collect();
         let mut schedule = state.schedule(settings);
@@ -191,7 +179,7 @@ impl Checkpoint {
             self.error(what, "copy it again, or use an older one")
         })?;
         state.film = self.film;
-        Ok(Resumed { state, schedule, seconds, is_relit })
+        Ok((state, schedule))
     }
 
     /// Checks that size, seed, sampler and program version are those of the checkpoint.
@@ -225,7 +213,7 @@ impl Checkpoint {
     }
 }
 
-/// Returns the seconds of rendering in a film file; 0 if they are missing or invalid.
+/// Returns the seconds of rendering in a film file, over all runs of the program; 0 if they are missing or invalid.
 pub(super) fn seconds_of(header: &FilmFileHeader) -> f64 {
     let seconds = header.chunks.get(&CLOCK).and_then(|clock| Fields::new(clock).f64());
     seconds.filter(|seconds| *seconds >= 0.0 && seconds.is_finite()).unwrap_or(0.0)

@@ -77,7 +77,7 @@ pub fn settings_text(sampler: &str, precision: &str, adaptive: bool, display: &D
 }
 
 fn display_text(display: &Display) -> String {
-    format!("{DISPLAY}{} EV, tone {}", display.exposure_ev, display.tone)
+    format!("{DISPLAY}{} EV, tone {}", display.exposure_ev, display.tone.name())
 }
 
 /// Key of the metadata entry with sampler, precision, sample allocation and display transform.

@@ -131,12 +131,12 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
                 |x, y| packet_pixels.iter().find(|p| p.position == (x, y)).map(|p| p.tile);
             for bad in rejected.bad.drain(..) {
                 if let Some(tile) = tile_of(bad.x, bad.y) {
-                    tiles[tile].1.record_bad(bad);
+                    tiles[tile].1.bad.record(bad);
                 }
             }
             for saturated in rejected.saturated.drain(..) {
                 if let Some(tile) = tile_of(saturated.x, saturated.y) {
-                    tiles[tile].1.record_saturated(1);
+                    tiles[tile].1.saturated_samples += 1;
                 }
             }
         });

@@ -135,8 +135,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
             }
             index += count as u32;
         }
-        rejected.bad.into_iter().for_each(|bad| tile.record_bad(bad));
-        tile.record_saturated(rejected.saturated.len() as u64);
+        rejected.bad.into_iter().for_each(|bad| tile.bad.record(bad));
+        tile.saturated_samples += rejected.saturated.len() as u64;
         tile.advance(replicate, job.count);
         tracer.counts()
     }
@@ -335,8 +335,8 @@ mod tests {
             let recorded =
                 if stored == 0.0 { (&sample[..], &[][..]) } else { (&[][..], &sample[..]) };
             assert_eq!((&rejected.bad[..], &rejected.saturated[..]), recorded, "{value}");
-            rejected.bad.into_iter().for_each(|bad| tile.record_bad(bad));
-            tile.record_saturated(rejected.saturated.len() as u64);
+            rejected.bad.into_iter().for_each(|bad| tile.bad.record(bad));
+            tile.saturated_samples += rejected.saturated.len() as u64;
             tile.advance(0, 1);
             let only = |group| crate::film::testing::only(group, 2);
             assert_eq!(film.bad_samples().count + film.saturated_samples(), 1);

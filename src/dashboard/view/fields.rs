@@ -78,7 +78,7 @@ fn draw_field(
     if let Some(editor) = chosen.and_then(|state| state.editor.as_ref()) {
         return typed(editor, &mut to);
     }
-    let swatch = field.swatch.and_then(|color| theme.swatch(Display::default().levels_8(color)));
+    let swatch = field.swatch.and_then(|color| theme.swatch(Display::default().to_8()(color)));
     if let Some(style) = swatch {
         to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
     }

@@ -59,7 +59,7 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
         chips.push((format!("{sign}{} EV", number(exposure.abs())), false));
     }
     if model.display.tone != Tone::Clip {
-        chips.push((model.display.tone.to_string(), false));
+        chips.push((model.display.tone.name().to_string(), false));
     }
     chips
 }

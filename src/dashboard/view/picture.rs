@@ -231,7 +231,7 @@ mod tests {
         let radiance = [[0.01, 0.2, 3.0], [0.5, 0.0, 0.1]];
         let raster = displayed(&radiance, &display, [2, 1]);
         for (pixel, radiance) in raster.pixels.iter().zip(radiance) {
-            assert_eq!(*pixel, display.levels_8(radiance.map(f64::from)));
+            assert_eq!(*pixel, display.to_8()(radiance.map(f64::from)));
         }
     }
 }

@@ -1,8 +1,6 @@
 //! Display transform of radiance to pixel values: exposure, tone curve, sRGB encoding.
 
 use crate::film::srgb_table::SrgbTable;
-use std::fmt;
-use std::str::FromStr;
 use zerkalo_scene::value::srgb_from_linear;
 
 /// Tone curve from radiance to linear light of a display, as a fraction of its white.
@@ -20,24 +18,13 @@ pub enum Tone {
 impl Tone {
     /// All tone curves, each with the name that options and scenes use.
     pub const NAMED: [(&'static str, Self); 2] = [("clip", Self::Clip), ("neutral", Self::Neutral)];
-}
 
-impl fmt::Display for Tone {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let named = Self::NAMED.iter().find(|(_, tone)| tone == self);
-        f.write_str(named.map_or("", |(name, _)| name))
+    pub fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
     }
-}
 
-impl FromStr for Tone {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let named = Self::NAMED.iter().find(|(name, _)| *name == text);
-        named.map(|(_, tone)| *tone).ok_or_else(|| {
-            let names: Vec<_> = Self::NAMED.iter().map(|(name, _)| *name).collect();
-            format!("tone curve `{text}` is not known; known: {}", names.join(", "))
-        })
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::NAMED.into_iter().find(|(known, _)| *known == name).map(|(_, tone)| tone)
     }
 }
 
@@ -55,12 +42,8 @@ impl Display {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Returns [`Display::levels`] rounded to 8 bits. A lookup table makes it several times faster.
-    pub fn levels_8(&self, radiance: [f64; 3]) -> [u8; 3] {
-        self.to_8()(radiance)
-    }
-
-    /// Returns [`Display::levels_8`] as a closure with precomputed constants, for many pixels.
+    /// Returns a closure that rounds [`Display::levels`] to 8 bits. A lookup table and precomputed
+    /// constants make it several times faster.
     pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
         let (tone, factor, curve) = (self.tone, self.exposure_factor(), SrgbTable::shared());
         move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.level_8(c))
@@ -176,7 +159,7 @@ mod tests {
     #[test]
     fn tone_curves_rise_and_stay_in_range() {
         for (name, tone) in Tone::NAMED {
-            assert_eq!((name.parse(), tone.to_string()), (Ok(tone), name.to_string()));
+            assert_eq!((Tone::from_name(name), tone.name()), (Some(tone), name));
             let display = Display { exposure_ev: 0.0, tone };
             let mut last = 0.0;
             for i in 0..20_000 {
@@ -186,7 +169,6 @@ mod tests {
             }
             assert!(display.levels([1e30, 1e300, 0.0]).iter().all(|c| (0.0..=255.0).contains(c)));
         }
-        let unknown = "filmic".parse::<Tone>().unwrap_err();
-        assert_eq!(unknown, "tone curve `filmic` is not known; known: clip, neutral");
+        assert_eq!(Tone::from_name("filmic"), None);
     }
 }

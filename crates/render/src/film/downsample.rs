@@ -120,7 +120,7 @@ impl IncrementalDownsample {
         let layout = &self.layout;
         let mut stale: Vec<(usize, &mut TilePart)> = self.parts.iter_mut().enumerate().collect();
         stale.retain_mut(|(index, part)| {
-            let version = film.tile(*index).map(|t| (film.epoch, t.counts, t.lattice_px()));
+            let version = film.tile(*index).map(|t| (film.epoch, t.counts, t.lattice_px));
             std::mem::replace(&mut part.version, version) != version
         });
         let changed = stale.len();
@@ -195,7 +195,7 @@ impl TilePart {
         let per_unit: Vec<f64> = film.scales().iter().flat_map(|s| [1.0 / s; 3]).collect();
         let mut line = vec![0.0; width];
         // In the first pass, only the pixels of the lattice have a sample.
-        let step = if tile.counts == [0; 2] { tile.lattice_px() } else { 1 };
+        let step = if tile.counts == [0; 2] { tile.lattice_px } else { 1 };
         for (y, rows) in down.pixels.iter().enumerate().step_by(step) {
             line.fill(0.0);
             add_row(tile, y, step, across, &per_unit, &mut line);

@@ -27,7 +27,7 @@ pub struct InvalidSamples {
 }
 
 impl InvalidSamples {
-    pub(super) fn record(&mut self, sample: InvalidSample) {
+    pub fn record(&mut self, sample: InvalidSample) {
         self.count += 1;
         self.remember(sample);
     }

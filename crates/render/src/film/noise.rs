@@ -118,7 +118,7 @@ impl Estimator {
     /// estimate is then too high, by at most a quarter if B has at least half as many samples as A.
     pub fn tile_so_far(&self, tile: &Tile) -> Option<TileNoise> {
         let counts = tile.counts;
-        if counts.contains(&0) || tile.lattice_px() != 0 {
+        if counts.contains(&0) || tile.lattice_px != 0 {
             return None;
         }
         let [n, m] = counts.map(f64::from);

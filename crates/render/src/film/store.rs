@@ -186,7 +186,7 @@ impl Film {
 
     /// Returns tile `index`; `None` if it was not written since the last restart.
     pub fn tile(&self, index: usize) -> Option<&Tile> {
-        Some(&self.tiles[index]).filter(|tile| tile.is_of(self.epoch))
+        Some(&self.tiles[index]).filter(|tile| tile.epoch == self.epoch)
     }
 
     /// Returns the number of pixels of tile `index` that are inside the picture.
@@ -208,7 +208,7 @@ impl Film {
 
     /// Iterates over the tiles written since the last restart, with their numbers.
     pub fn touched(&self) -> impl Iterator<Item = (usize, &Tile)> {
-        self.tiles.iter().enumerate().filter(|(_, tile)| tile.is_of(self.epoch))
+        self.tiles.iter().enumerate().filter(|(_, tile)| tile.epoch == self.epoch)
     }
 
     /// Returns handles of tiles, in the order of `indices`.
@@ -240,7 +240,7 @@ impl Film {
         let samples_of_tile = |tile: &Tile| {
             let [width, height] = tile.extent;
             let counts = tile.counts.map(u64::from);
-            let lattice = match tile.lattice_px() {
+            let lattice = match tile.lattice_px {
                 0 => 0,
                 step => width.div_ceil(step) * height.div_ceil(step),
             };
@@ -305,7 +305,7 @@ impl Film {
     /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to tile `index`.
     pub(super) fn add_at(&mut self, index: usize, tile: Tile) {
         let ours = &mut self.tiles[index];
-        if ours.is_of(self.epoch) {
+        if ours.epoch == self.epoch {
             ours.add_tile(&tile);
         } else {
             *ours = tile;

@@ -146,7 +146,7 @@ fn add_tile(tile: Option<&Tile>, out: &mut Vec<u8>) {
         return out.extend([0; 9]);
     };
     tile.counts.iter().for_each(|count| out.extend(count.to_le_bytes()));
-    out.push(tile.lattice_px() as u8);
+    out.push(tile.lattice_px as u8);
     let [width, height] = tile.extent;
     for replicate in 0..2 {
         for pixel in (0..height).flat_map(|y| (0..width).map(move |x| y * TILE + x)) {

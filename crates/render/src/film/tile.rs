@@ -1,7 +1,7 @@
 //! Film tile of 16x16 pixels: integer sums of the samples of both replicates.
 
+use crate::film::TILE;
 use crate::film::invalid::InvalidSamples;
-use crate::film::{InvalidSample, TILE};
 use std::collections::TryReserveError;
 use zerkalo_kernel::lanes::prefetch;
 
@@ -25,7 +25,7 @@ static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 #[derive(Debug, Default)]
 pub struct Tile {
     /// Epoch of the film when the tile was written; 0 for a new tile.
-    epoch: u64,
+    pub(super) epoch: u64,
     /// Number of integer sums of a pixel and replicate: `groups * 3`.
     stride: usize,
     /// Width and height of the tile's part inside the picture, 1..=16 pixels.
@@ -33,13 +33,16 @@ pub struct Tile {
     /// Number of samples of every pixel in the replicates A and B, without an incomplete first
     /// pass.
     pub counts: [u32; 2],
-    lattice_px: u8,
+    /// Progress of the first pass: pixels whose x and y are multiples of this number have their first
+    /// sample of replicate A. 0 before and after the first pass.
+    pub lattice_px: usize,
     /// `true` if an integer sum has reached `i64::MAX`.
     pub(super) full: bool,
     /// Number of samples above the largest value that the film can store, to which they were
     /// clamped.
-    pub(super) saturated_samples: u64,
-    pub(super) bad: InvalidSamples,
+    pub saturated_samples: u64,
+    /// Invalid samples, in whose place black was added.
+    pub bad: InvalidSamples,
     /// Integer sums, `[replicate][pixel][group][channel]`. Empty until the tile is first written.
     sums: Vec<i64>,
     /// Bits of the pixels written since the film's last restart: bit `p % 64` of `[replicate][p /
@@ -90,20 +93,10 @@ impl Tile {
         *self = Self { epoch, sums, ..Self::cleared(self.stride / 3, self.extent) };
     }
 
-    pub(super) fn is_of(&self, epoch: u64) -> bool {
-        self.epoch == epoch
-    }
-
-    /// Returns the progress of the first pass: pixels whose x and y are multiples of the result
-    /// have their first sample of replicate A. 0 before and after the first pass.
-    pub fn lattice_px(&self) -> usize {
-        usize::from(self.lattice_px)
-    }
-
     /// Returns the number of samples of one pixel in the replicates A and B.
     #[inline]
     pub fn counts_of(&self, pixel: usize) -> [u32; 2] {
-        let extra = self.lattice_px != 0 && on_lattice(pixel, usize::from(self.lattice_px));
+        let extra = self.lattice_px != 0 && on_lattice(pixel, self.lattice_px);
         [self.counts[0] + u32::from(extra), self.counts[1]]
     }
 
@@ -125,7 +118,7 @@ impl Tile {
     pub fn set_lattice(&mut self, step_px: usize) {
         assert!(
             matches!(step_px, 1 | 2 | 4 | 8 | 16)
-                && (self.lattice_px == 0 || step_px <= self.lattice_px()),
+                && (self.lattice_px == 0 || step_px <= self.lattice_px),
             "a lattice of {step_px} pixels after one of {}",
             self.lattice_px
         );
@@ -133,7 +126,7 @@ impl Tile {
             self.lattice_px = 0;
             self.advance(0, 1);
         } else {
-            self.lattice_px = step_px as u8;
+            self.lattice_px = step_px;
         }
     }
 
@@ -208,18 +201,6 @@ impl Tile {
         (0..TILE_PIXELS).filter(full).count() as u64
     }
 
-    /// Increases the number of saturated samples by `samples`.
-    #[cold]
-    pub fn record_saturated(&mut self, samples: u64) {
-        self.saturated_samples += samples;
-    }
-
-    /// Records an invalid sample, in whose place the caller adds black.
-    #[cold]
-    pub fn record_bad(&mut self, sample: InvalidSample) {
-        self.bad.record(sample);
-    }
-
     /// Adds the samples of `other`, a tile at the same position of another film. At most one of the
     /// two tiles may be in its first pass.
     pub(super) fn add_tile(&mut self, other: &Self) {
@@ -287,7 +268,7 @@ mod tests {
         assert!(tile.any_sampled() && tile.counts_of(137) == [0; 2]);
         assert_eq!((tile.counts, tile.counts_of(8)), ([0, 0], [1, 0]));
         tile.set_lattice(1);
-        assert_eq!((tile.counts, tile.lattice_px()), ([1, 0], 0));
+        assert_eq!((tile.counts, tile.lattice_px), ([1, 0], 0));
         assert_eq!(tile.counts_of(137), [1, 0]);
     }
 
@@ -320,7 +301,7 @@ mod tests {
         let mut tile = tile();
         tile.add(0, 0, &[1; 6]);
         tile.advance(0, 1);
-        tile.record_saturated(3);
+        tile.saturated_samples += 3;
         tile.clear_if_stale(1);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts), (1, [1, 0]));
         assert_eq!(tile.saturated_samples, 3);

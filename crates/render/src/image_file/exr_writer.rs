@@ -197,9 +197,9 @@ fn encode_rows(
                 .map(|replicates| sums.mean(replicates, mixed));
             for ((_, source), bytes) in channels.iter().zip(bytes.iter_mut()) {
                 let value = match *source {
-                    Source::Mixed(Replicates::Both, c) => (means[0][c] as f32).to_ne_bytes(),
-                    Source::Mixed(Replicates::A, c) => (means[1][c] as f32).to_ne_bytes(),
-                    Source::Mixed(Replicates::B, c) => (means[2][c] as f32).to_ne_bytes(),
+                    Source::Mixed(replicates, c) => {
+                        (means[replicates as usize][c] as f32).to_ne_bytes()
+                    }
                     Source::Group(group, c) => {
                         group_mean(&sums, mixed, 3 * group + c).to_ne_bytes()
                     }

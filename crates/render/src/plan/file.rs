@@ -61,7 +61,7 @@ impl Plan {
             s.sampler.name(),
             s.precision,
             s.display.exposure_ev,
-            s.display.tone,
+            s.display.tone.name(),
             s.rays_per_pixel,
             s.noise_levels,
             self.predicted_levels,
@@ -139,7 +139,7 @@ impl Plan {
                 exposure_ev: lines.setting("exposure", "a number from -64 to 64", |text| {
                     number(text).filter(|ev: &f64| ev.abs() <= 64.0)
                 })?,
-                tone: lines.setting("tone", "clip or neutral", |text| Tone::from_str(text).ok())?,
+                tone: lines.setting("tone", "clip or neutral", Tone::from_name)?,
             },
             rays_per_pixel: lines.setting("rays_per_pixel", "an integer from 0", number)?,
             noise_levels: lines.setting("noise", "a number above 0", positive)?,

@@ -193,16 +193,8 @@ impl FilmFiles {
             held.sort_unstable();
             let absent = plan.absent(&held);
             if !absent.is_empty() {
-                let (path, state) = (None, WatchedState::Missing);
-                let shards = ranges(&absent);
-                rows.push(WatchedShards {
-                    shards,
-                    path,
-                    state,
-                    samples: 0,
-                    total: None,
-                    age: None,
-                });
+                let missing = FilmFile::new(PathBuf::new(), None).row(now);
+                rows.push(WatchedShards { shards: ranges(&absent), path: None, ..missing });
             }
         }
         let share = |row: &WatchedShards| match row.total {
@@ -393,7 +385,7 @@ impl FilmFile {
         let age = |stamp: FileStamp| now.duration_since(stamp.modified).unwrap_or_default();
         let age = self.stamp.map(age);
         let shards = match self.part() {
-            Some(part) => ranges(&part.shards.iter().map(|s| s.number).collect::<Vec<_>>()),
+            Some(part) => ranges(&part.numbers(|_| true)),
             None => self.shard.map_or(String::new(), |shard| shard.to_string()),
         };
         let state = match &self.contents {

@@ -29,8 +29,7 @@ impl Merged {
         films.try_add().map_err(|(_, reason)| reason)?;
         let (header, film) = films.sum.ok_or("there is nothing to merge")?;
         if part.shards.iter().all(|shard| shard.complete) {
-            let numbers: Vec<u32> = part.shards.iter().map(|shard| shard.number).collect();
-            if let Some(tile) = part.plan.differing_tile(&film, &numbers) {
+            if let Some(tile) = part.plan.differing_tile(&film, &part.numbers(|_| true)) {
                 return Err(format!(
                     "the parts do not hold the samples of their shards: tile {tile} differs from \
                      the plan; trace the shards again"
@@ -59,8 +58,7 @@ fn check_complete(films: &FilmFiles, part: &Part) -> Result<(), String> {
         }
     }
     let settings = &part.plan.settings;
-    let held: Vec<u32> = part.shards.iter().map(|shard| shard.number).collect();
-    let missing = part.plan.absent(&held);
+    let missing = part.plan.absent(&part.numbers(|_| true));
     if let Some(first) = missing.first() {
         let base = if *first == BASE { " (0 is the base, which `zerkalo plan` wrote)" } else { "" };
         let (count, missing) = (settings.shards, ranges(&missing));

@@ -38,9 +38,8 @@ impl Part {
             let state = if *complete { "complete" } else { "unfinished" };
             let _ = writeln!(text, "shard {number} {state}");
         }
-        let (key, shards) = self.origin();
-        header.metadata.retain(|(k, _)| *k != key);
-        header.metadata.push((key, shards));
+        header.metadata.retain(|(key, _)| key != "Shards");
+        header.metadata.push(("Shards".to_string(), self.origin()));
         header.chunks.insert(PLAN_TAG, self.plan.text().into_bytes());
         header.chunks.insert(PART_TAG, text.into_bytes());
     }
@@ -94,29 +93,30 @@ impl Part {
         numbers.eq(BASE..=self.plan.settings.shards) && self.shards.iter().all(|s| s.complete)
     }
 
+    /// Returns the numbers of the shards that are `wanted`.
+    pub(super) fn numbers(&self, wanted: impl Fn(&PartShard) -> bool) -> Vec<u32> {
+        self.shards.iter().filter(|shard| wanted(shard)).map(|shard| shard.number).collect()
+    }
+
     /// Returns the numbers of the shards that are missing or incomplete, such as `3, 5-7`. `None`
     /// if the film holds all shards completely.
     pub fn missing(&self) -> Option<String> {
-        let complete = self.shards.iter().filter(|shard| shard.complete);
-        let missing = self.plan.absent(&complete.map(|shard| shard.number).collect::<Vec<_>>());
+        let missing = self.plan.absent(&self.numbers(|shard| shard.complete));
         (!missing.is_empty()).then(|| ranges(&missing))
     }
 
     /// Returns the metadata entry `Shards`, such as `0-2, 4 of 5, unfinished 4, missing 3, 5, plan
     /// 0123456789abcdef`.
-    fn origin(&self) -> (String, String) {
-        let numbers = |wanted: &dyn Fn(&PartShard) -> bool| -> Vec<u32> {
-            self.shards.iter().filter(|shard| wanted(shard)).map(|shard| shard.number).collect()
-        };
-        let here = numbers(&|_| true);
+    fn origin(&self) -> String {
+        let here = self.numbers(|_| true);
         let mut text = format!("{} of {}", ranges(&here), self.plan.settings.shards);
-        let unfinished = numbers(&|shard| !shard.complete);
+        let unfinished = self.numbers(|shard| !shard.complete);
         for (state, numbers) in [("unfinished", unfinished), ("missing", self.plan.absent(&here))] {
             if !numbers.is_empty() {
                 text += &format!(", {state} {}", ranges(&numbers));
             }
         }
-        ("Shards".to_string(), format!("{text}, plan {:016x}", self.plan.checksum()))
+        format!("{text}, plan {:016x}", self.plan.checksum())
     }
 }
 

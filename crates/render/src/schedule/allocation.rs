@@ -97,7 +97,7 @@ impl ErrorModel {
 }
 
 /// Models fitted to the allocation and to the validation estimates of one tile.
-struct TileModels {
+pub(super) struct TileModels {
     allocation: ErrorModel,
     validation: ErrorModel,
 }
@@ -233,13 +233,9 @@ impl Schedule {
         self.jobs_to(allocation.counts.into_iter())
     }
 
-    /// Returns the expected error of each tile. `pooled` are the slopes of tiles that are not
+    /// Fits models to the estimates of each tile. `pooled` are the slopes of tiles that are not
     /// glossy, and of glossy tiles.
-    pub(super) fn expected_errors(&self, pooled: [f64; 2]) -> Vec<ErrorModel> {
-        self.calibrated(&self.tile_models(pooled))
-    }
-
-    fn tile_models(&self, pooled: [f64; 2]) -> Vec<TileModels> {
+    pub(super) fn tile_models(&self, pooled: [f64; 2]) -> Vec<TileModels> {
         self.tiles.iter().map(|t| tile_models(t, self.settings.criterion, pooled)).collect()
     }
 
@@ -247,7 +243,7 @@ impl Schedule {
     /// validation estimates of the tile's class and of the tile's own allocation estimate, weighted
     /// by pixels and [`OWN_WEIGHT`]. The own estimate keeps the expected error above 0 if the
     /// validation estimates of the class are 0.
-    fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
+    pub(super) fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);
         let class_of = |tile: &Tile, models: &TileModels| -> Class {

@@ -1,6 +1,6 @@
 //! Active render of a session: traces one scene in pieces of a fraction of a second.
 
-use crate::checkpoint::Checkpoint;
+use crate::checkpoint::{Checkpoint, seconds_of};
 use crate::film::{Film, IncrementalDownsample};
 use crate::first_hit_buffer::FirstHitBuffer;
 use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
@@ -125,14 +125,16 @@ impl ActiveRender {
     ) -> Result<Self, String> {
         let started = Instant::now();
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
-        let resumed =
-            checkpoint.resume(scene, options, settings).map_err(|error| error.to_string())?;
+        let seconds = seconds_of(&checkpoint.header);
+        let (weights, display) = (checkpoint.header.weights.clone(), checkpoint.header.display);
+        let resumed = checkpoint.resume(scene, options, settings);
+        let (state, schedule) = resumed.map_err(|error| error.to_string())?;
         let mut render = Self {
-            traced_for: Duration::from_secs_f64(resumed.seconds),
+            traced_for: Duration::from_secs_f64(seconds),
             first_picture_after: Some(started.elapsed()),
-            ..Self::new(resumed.state, resumed.schedule, started)
+            ..Self::new(state, schedule, started)
         };
-        if resumed.is_relit {
+        if render.state.weights != weights || render.state.display() != display {
             render.invalidate_estimates();
         }
         Ok(render)

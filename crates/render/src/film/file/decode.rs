@@ -2,7 +2,7 @@
 //! memory.
 
 use crate::file_error::{self, FileError, begins_with};
-use crate::film::display::Display;
+use crate::film::display::{Display, Tone};
 use crate::film::file::encode::CHECKSUM_BYTES;
 use crate::film::file::{
     DONE, FilmFileHeader, HEAD, MAGIC, MAX_SIDE, META, TILES, TILES_PER_CHUNK, Tag, VERSION,
@@ -207,7 +207,7 @@ fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     }
     let (seed, precision) = (fields.u64()?, fields.text()?);
     let exposure_ev = fields.f64()?;
-    let tone = fields.text()?.parse().ok()?;
+    let tone = Tone::from_name(&fields.text()?)?;
     let plain = Precision::from_name(&precision).is_some() && exposure_ev.is_finite();
     (plain && fields.is_empty()).then(|| FilmFileHeader {
         film: Header { width, height, scales, seed, precision },

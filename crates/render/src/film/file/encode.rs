@@ -45,7 +45,7 @@ impl FilmFileHeader {
         out.extend(film.seed.to_le_bytes());
         text(&film.precision, out);
         out.extend(self.display.exposure_ev.to_le_bytes());
-        text(&self.display.tone.to_string(), out);
+        text(self.display.tone.name(), out);
     }
 }
 

@@ -4,7 +4,7 @@ use super::*;
 use crate::FileError;
 use crate::film::testing::TestFilm;
 use crate::film::testing::{Rng, each_tile, film, white};
-use crate::film::{Film, InvalidSample, TILE};
+use crate::film::{Film, InvalidSample, TILE, Tone};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -28,8 +28,8 @@ fn sample_film() -> Film {
             tile.advance(replicate, count);
         }
         if x0 == 0 {
-            tile.record_bad(InvalidSample { index: 3, replicate: 1, y: y0 as u32, x: 2 });
-            tile.record_saturated(5);
+            tile.bad.record(InvalidSample { index: 3, replicate: 1, y: y0 as u32, x: 2 });
+            tile.saturated_samples += 5;
         }
     });
     film
@@ -40,7 +40,7 @@ fn header_of(film: &Film) -> FilmFileHeader {
         film: film.header.clone(),
         weights: white(film.groups()),
         group_names: vec!["lamp".to_string(), "ambient".to_string()],
-        display: Display { exposure_ev: -1.5, tone: "neutral".parse().unwrap() },
+        display: Display { exposure_ev: -1.5, tone: Tone::Neutral },
         metadata: vec![("Source".to_string(), "r\u{e4}ume.toml".to_string())],
         chunks: BTreeMap::from([(*b"SCEN", b"[film]".to_vec()), (*b"XTRA", vec![9; 70_000])]),
     }
