@@ -218,7 +218,7 @@ mod tests {
         let plan = Plan { experiments, threads, ..Plan::default() };
         let text = include_str!("../../scenes/mirror-room.toml");
         let all = plan.variants(&Arc::new(Scene::parse(text, "mirror-room.toml").unwrap()));
-        assert_eq!((all[0].experiment, all[0].threads), (&DEFAULT, threads));
+        assert_eq!((all[0].experiment.name, all[0].threads), (DEFAULT.name, threads));
         all[1..].iter().map(|v| v.name.clone()).collect()
     }
 

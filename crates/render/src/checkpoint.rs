@@ -9,7 +9,7 @@
 use crate::export::{Provenance, film_header};
 use crate::file_error::FileError;
 use crate::film::Film;
-use crate::film::file::{EncodedFilm, Fields, FilmFileHeader, FilmReader, Tag};
+use crate::film::file::{EncodedFilm, Fields, FilmFileHeader, FilmReader, Tag, text};
 use crate::schedule::{Schedule, Settings};
 use crate::session::Report;
 use crate::{Options, RenderState};
@@ -56,10 +56,7 @@ impl SampleInputs {
     /// Encodes the inputs as a chunk of a film file.
     pub fn encode(&self) -> (Tag, Vec<u8>) {
         let mut out = self.contents_hash.unwrap_or(0).to_le_bytes().to_vec();
-        for text in [&self.program, &self.sampler, &self.scene] {
-            out.extend((text.len() as u32).to_le_bytes());
-            out.extend(text.bytes());
-        }
+        [&self.program, &self.sampler, &self.scene].into_iter().for_each(|t| text(t, &mut out));
         (SCENE, out)
     }
 
@@ -213,7 +210,8 @@ impl Checkpoint {
     }
 }
 
-/// Returns the seconds of rendering in a film file, over all runs of the program; 0 if they are missing or invalid.
+/// Returns the seconds of rendering in a film file, over all runs of the program; 0 if they are
+/// missing or invalid.
 pub(super) fn seconds_of(header: &FilmFileHeader) -> f64 {
     let seconds = header.chunks.get(&CLOCK).and_then(|clock| Fields::new(clock).f64());
     seconds.filter(|seconds| *seconds >= 0.0 && seconds.is_finite()).unwrap_or(0.0)

@@ -81,8 +81,7 @@ impl RenderState {
         let (size, groups) =
             ([scene.film.size[0], rows.len() as u32], world.info().groups.members.len());
         let film_of = |previous: &Self| {
-            let size = [previous.film.width(), previous.film.height()].map(|n| n as u32);
-            Film::memory_bytes(size, previous.film.groups())
+            Film::memory_bytes(previous.film.header.size(), previous.film.groups())
         };
         // The memory of a band was checked when the picture was divided into bands.
         if size == scene.film.size {

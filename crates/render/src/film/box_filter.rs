@@ -59,7 +59,7 @@ pub fn box_means(
 /// row. A row without samples gets the values of the nearest row with samples.
 pub(super) fn fill_gaps(
     means: &mut [f32],
-    known: &mut [bool],
+    known: &[bool],
     cols: usize,
     rows: usize,
     stride: usize,

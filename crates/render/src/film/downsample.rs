@@ -156,7 +156,7 @@ impl IncrementalDownsample {
             let mean = |sum: &f64| if area > 0.0 { (sum / area) as f32 } else { 0.0 };
             means.extend(cell[1..].iter().map(mean));
         }
-        fill_gaps(&mut means, &mut known, cols, rows, stride);
+        fill_gaps(&mut means, &known, cols, rows, stride);
         Thumbnail { cols, rows, means, groups }
     }
 }

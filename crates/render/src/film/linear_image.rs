@@ -28,8 +28,8 @@ impl LinearImage {
                 known[start + x] = sums.count(Replicates::Both) > 0;
             });
         }
-        if !known.iter().all(|k| *k) {
-            fill_gaps(pixels.as_flattened_mut(), &mut known, width, height, 3);
+        if known.contains(&false) {
+            fill_gaps(pixels.as_flattened_mut(), &known, width, height, 3);
         }
         Self { size: [width, height], pixels }
     }

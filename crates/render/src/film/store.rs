@@ -33,6 +33,11 @@ impl Header {
     pub(super) fn is_valid_scale(scale: f64) -> bool {
         scale.is_normal() && scale > 0.0 && scale.to_bits() << 12 == 0
     }
+
+    /// Returns width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height].map(|n| n as u32)
+    }
 }
 
 /// Integer sums of samples for every pixel, light group, channel and replicate. The radiance of a
@@ -108,8 +113,7 @@ impl Film {
     /// Allocates the tiles of a large film. The tiles of a small film are allocated when they are
     /// first written, so that the first picture appears sooner.
     fn reserve(&mut self) -> Result<(), TryReserveError> {
-        let size = [self.width(), self.height()].map(|n| n as u32);
-        if Self::memory_bytes(size, self.groups()) < RESERVED_FROM {
+        if Self::memory_bytes(self.header.size(), self.groups()) < RESERVED_FROM {
             return Ok(());
         }
         self.tiles.iter_mut().try_for_each(Tile::reserve)

@@ -340,7 +340,7 @@ impl FilmFiles {
 /// Creates an empty film for `header`. Fails if there is not enough memory.
 fn empty(header: &FilmFileHeader) -> Result<Film, String> {
     let film = &header.film;
-    let (size, groups) = ([film.width, film.height].map(|n| n as u32), film.scales.len());
+    let (size, groups) = (film.size(), film.scales.len());
     memory_budget::check(size, groups, 0)?;
     Film::try_new(film.clone(), None).map_err(|_| memory_budget::refused(size, groups))
 }

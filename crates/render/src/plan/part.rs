@@ -55,8 +55,7 @@ impl Part {
         let part = header.chunks.get(&PART_TAG).and_then(|text| Self::parse(plan, text));
         let part = part.ok_or_else(|| damaged("its list of shards is not valid"))?;
         let settings = &part.plan.settings;
-        let size = settings.size.map(|n| n as usize);
-        if size != [header.film.width, header.film.height]
+        if settings.size != header.film.size()
             || settings.seed != header.film.seed
             || settings.precision != header.film.precision
         {

@@ -156,8 +156,7 @@ impl WatchReport {
         let settings = films.plan.as_ref().map(|plan| &plan.settings);
         let (size, display, source) = match (&films.sum, settings) {
             (Some((header, _)), _) => {
-                let size = [header.film.width, header.film.height].map(|n| n as u32);
-                (Some(size), header.display, header.source().unwrap_or_default())
+                (Some(header.film.size()), header.display, header.source().unwrap_or_default())
             }
             (None, Some(plan)) => (Some(plan.size), plan.display, plan.source.as_str()),
             (None, None) => (None, Display::default(), ""),

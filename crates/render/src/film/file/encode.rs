@@ -104,7 +104,8 @@ fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     })
 }
 
-fn text(text: &str, out: &mut Vec<u8>) {
+/// Appends a text after its length in bytes (u32).
+pub fn text(text: &str, out: &mut Vec<u8>) {
     out.extend((text.len() as u32).to_le_bytes());
     out.extend(text.as_bytes());
 }

@@ -37,7 +37,7 @@ mod tests;
 mod tile_record;
 
 pub use decode::{Fields, FilmReader, is_film_file};
-pub use encode::EncodedFilm;
+pub use encode::{EncodedFilm, text};
 
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
