@@ -27,14 +27,14 @@ pub struct Point {
 /// points for each halving of the error.
 const POINT_RATIO: f64 = 0.84;
 
-/// Renders with the settings of `variant` until the error is at most `target` 8-bit levels, until
-/// `seconds` seconds of tracing have passed, or until further samples cannot change the picture. The
-/// error is the estimated one for biased settings, whose true error does not converge to 0. Returns
-/// the error curve and the render, or the error of the system if a thread cannot be started.
+/// Renders with the settings of `variant` until the error is at most `levels` 8-bit levels, `seconds`
+/// of tracing have passed, or further samples cannot change the picture. The error is the estimated
+/// one for biased settings, whose true error does not converge to 0. Returns the error curve and the
+/// render, or the error of the system if a thread cannot be started.
 pub fn follow(
     variant: &Variant,
     reference: &Reference,
-    target: f64,
+    levels: f64,
     seconds: f64,
 ) -> io::Result<(Vec<Point>, SyncRender)> {
     let mut render = variant.start()?;
@@ -62,7 +62,7 @@ pub fn follow(
             }
             let is_unbiased = variant.experiment.is_unbiased;
             let error = if is_unbiased { Some(errors.rmse_levels) } else { estimate };
-            if error.is_some_and(|levels| levels <= target) || done || timed_out || noiseless {
+            if error.is_some_and(|error| error <= levels) || done || timed_out || noiseless {
                 break;
             }
         }

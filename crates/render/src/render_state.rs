@@ -80,12 +80,11 @@ impl RenderState {
         let world = AnyWorld::compile(&scene, &options.world);
         let (size, groups) =
             ([scene.film.size[0], rows.len() as u32], world.info().groups.members.len());
-        let film_of = |previous: &Self| {
-            Film::memory_bytes(previous.film.header.size(), previous.film.groups())
-        };
+        let previous = previous.map(|previous| previous.film);
         // The memory of a band was checked when the picture was divided into bands.
         if size == scene.film.size {
-            memory_budget::check(size, groups, previous.as_ref().map_or(0, film_of))?;
+            let memory = |film: &Film| Film::memory_bytes(film.header.size(), film.groups());
+            memory_budget::check(size, groups, previous.as_ref().map_or(0, memory))?;
         }
         let [width, height] = size.map(|n| n as usize);
         let header = Header {
@@ -97,7 +96,7 @@ impl RenderState {
         };
         let weights = LightWeights { weights: world.info().groups.mix(&scene) };
         let estimator = Estimator::new(&header.scales, &weights, &options.display);
-        let film = Film::try_new(header, previous.map(|previous| previous.film));
+        let film = Film::try_new(header, previous);
         let film = film.map_err(|_| memory_budget::refused(size, groups))?;
         let film = film.starting_at(rows.start as usize);
         let groups = world.info().groups.clone();

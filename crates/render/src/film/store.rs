@@ -96,7 +96,7 @@ impl Film {
             // Caches that compare epochs must not mistake the new film for the old one.
             film.epoch = previous.epoch + 1;
             for (tile, old) in film.tiles.iter_mut().zip(previous.tiles) {
-                tile.take_memory(old);
+                tile.sums = old.sums;
             }
         }
         film.reserve()?;

@@ -43,8 +43,9 @@ pub struct Tile {
     pub saturated_samples: u64,
     /// Invalid samples, in whose place black was added.
     pub bad: InvalidSamples,
-    /// Integer sums, `[replicate][pixel][group][channel]`. Empty until the tile is first written.
-    sums: Vec<i64>,
+    /// Integer sums, `[replicate][pixel][group][channel]`. Until the tile is first written, only the
+    /// memory is used.
+    pub(super) sums: Vec<i64>,
     /// Bits of the pixels written since the film's last restart: bit `p % 64` of `[replicate][p /
     /// 64]` is for pixel p. Sums of other pixels count as zero, so that a restart does not access
     /// them.
@@ -54,12 +55,6 @@ pub struct Tile {
 impl Tile {
     pub(super) fn cleared(groups: usize, extent: [usize; 2]) -> Self {
         Self { stride: groups * 3, extent, ..Self::default() }
-    }
-
-    /// Takes the memory of `old`, a tile of another film. Nothing may have been written to this
-    /// tile yet.
-    pub(super) fn take_memory(&mut self, old: Self) {
-        self.sums = old.sums;
     }
 
     pub(super) fn sums_len(groups: usize) -> usize {
@@ -314,7 +309,7 @@ mod tests {
         assert_eq!((tile.pixel(0, 0), tile.pixel(1, 0)), (&[2; 6][..], &[0; 6][..]));
         for groups in [1, 3] {
             let memory = std::mem::replace(&mut tile, Tile::cleared(groups, [16, 16]));
-            tile.take_memory(memory);
+            tile.sums = memory.sums;
             tile.clear_if_stale(7);
             tile.add(1, 255, &vec![5; 3 * groups]);
             assert_eq!(tile.pixel(1, 255), vec![5; 3 * groups]);

@@ -28,13 +28,13 @@ impl Merged {
         }
         films.try_add().map_err(|(_, reason)| reason)?;
         let (header, film) = films.sum.ok_or("there is nothing to merge")?;
-        if part.shards.iter().all(|shard| shard.complete) {
-            if let Some(tile) = part.plan.differing_tile(&film, &part.numbers(|_| true)) {
-                return Err(format!(
-                    "the parts do not hold the samples of their shards: tile {tile} differs from \
-                     the plan; trace the shards again"
-                ));
-            }
+        if part.shards.iter().all(|shard| shard.complete)
+            && let Some(tile) = part.plan.differing_tile(&film, &part.numbers(|_| true))
+        {
+            return Err(format!(
+                "the parts do not hold the samples of their shards: tile {tile} differs from the \
+                 plan; trace the shards again"
+            ));
         }
         Ok(Self { film, header, part })
     }
