@@ -3,6 +3,7 @@
 use crate::restorer::Restorer;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use crossterm::terminal;
+use rustix::io::retry_on_intr;
 use rustix::termios::{OptionalActions, QueueSelector, Termios, tcflush, tcgetattr, tcsetattr};
 use std::io::{self, Write};
 use std::panic;
@@ -59,22 +60,15 @@ pub fn cell_px() -> Option<[u16; 2]> {
     Some([cell(size.width, size.columns)?, cell(size.height, size.rows)?])
 }
 
-/// Repeats a change of modes that a signal interrupts.
-fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
-    loop {
-        match change() {
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            done => return done,
-        }
-    }
+fn set_modes(modes: &Termios) -> io::Result<()> {
+    let set = retry_on_intr(|| tcsetattr(io::stdin(), OptionalActions::Now, modes));
+    set.map_err(io::Error::from)
 }
 
-/// Sets raw mode. `modes_before`, which crossterm stores and later restores, are set first, because
-/// a shell may have changed the modes while the program was suspended.
 fn set_raw_mode(modes_before: &Termios) -> io::Result<()> {
-    uninterrupted(terminal::disable_raw_mode)?;
-    uninterrupted(|| Ok(tcsetattr(io::stdin(), OptionalActions::Now, modes_before)?))?;
-    uninterrupted(terminal::enable_raw_mode)
+    let mut modes = modes_before.clone();
+    modes.make_raw();
+    set_modes(&modes)
 }
 
 impl Screen {
@@ -165,8 +159,8 @@ impl Tty {
             // A terminal that is gone needs no restoration.
             let _ = out.write_all(&bytes).and_then(|()| out.flush());
         }
-        if self.modes_before.is_some() {
-            let _ = uninterrupted(terminal::disable_raw_mode);
+        if let Some(modes_before) = &self.modes_before {
+            let _ = set_modes(modes_before);
             // The shell would read late replies.
             let _ = tcflush(io::stdin(), QueueSelector::IFlush);
         }
