@@ -8,7 +8,6 @@ use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::{Snapshot, View, WatchReport};
 use zerkalo_scene::{SaveError, Scene, SceneErrors};
 use zerkalo_terminal::event::{Key, Mouse};
-use zerkalo_terminal::flow::LinkStatus;
 use zerkalo_terminal::image::ViewerImage;
 
 /// Event that changes the model.
@@ -43,8 +42,8 @@ pub enum Message {
     ViewerImage(PathBuf, Result<Arc<ViewerImage>, String>),
     /// Fraction of the viewed image that the terminal has received, 0..=1.
     ImageSent(f64),
-    /// Status of the connection to a remote terminal; `None` for a local terminal.
-    LinkStatus(Option<LinkStatus>),
+    /// Value of [`Model::connection_rate`](crate::dashboard::model::Model::connection_rate).
+    ConnectionRate(Option<f64>),
     /// Expiry of [`Model::next_timeout`](crate::dashboard::model::Model::next_timeout).
     Tick,
 }

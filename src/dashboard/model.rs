@@ -14,7 +14,6 @@ use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{History, Scene, SceneErrors};
 pub use zerkalo_terminal::cells::Colors;
 use zerkalo_terminal::event::Button;
-use zerkalo_terminal::flow::LinkStatus;
 
 /// Mode of the picture's panel: the effect of arrow keys and drags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -151,8 +150,8 @@ pub struct Model {
     pub stop: Stop,
     /// `true` if the user has paused the render.
     pub paused: bool,
-    /// Status of the connection to a remote terminal; `None` for a local terminal.
-    pub link: Option<LinkStatus>,
+    /// Bytes per second of the connection to a remote terminal; `None` for a local terminal.
+    pub connection_rate: Option<f64>,
     pub notice: Option<Notice>,
     pub export: Option<RunningExport>,
     pub last_export: Option<PathBuf>,

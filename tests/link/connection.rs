@@ -100,7 +100,7 @@ impl Connection {
             self.flow.expire(self.now);
             if self.flow.wants_queue_length(self.now) {
                 let queued = self.queued();
-                self.flow.on_queue_length(self.now, Some(queued));
+                self.flow.record_queue_length(self.now, Some(queued));
             }
             if self.is_user_active {
                 self.flow.record_input(self.now);

@@ -233,7 +233,7 @@ fn keys_wait_for_one_frame_only() {
             }
             latencies.sort_by(f64::total_cmp);
             let [median, p95] = [latencies.len() / 2, latencies.len() - 2].map(|at| latencies[at]);
-            let found = connection.flow.reading().unwrap().rate;
+            let found = connection.flow.rate().unwrap();
             let what = format!(
                 "{mode:?}, {rate} B/s, {round_trip:?}: median {median:.3} s, p95 {p95:.3} s, rate {found:.0}"
             );

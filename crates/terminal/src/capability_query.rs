@@ -43,13 +43,13 @@ const TRUE_COLOR: [&str; 3] = ["2::1:2:3", "2:1:2:3", "2;1;2;3"];
 /// Number of the private mode for synchronised updates.
 const SYNCHRONISED: u16 = 2026;
 
-/// Returns the request of the cursor position, to which a terminal replies when it has processed
-/// all earlier bytes. It is wrapped to pass through a multiplexer.
-pub fn cursor_request(through: Option<Multiplexer>) -> &'static str {
+/// Returns the request of the terminal's status (DSR 5), to which every terminal replies when it has
+/// processed all earlier bytes. It is wrapped to pass through a multiplexer.
+pub fn status_request(through: Option<Multiplexer>) -> &'static str {
     match through {
-        None => "\x1b[6n",
-        Some(Multiplexer::Tmux) => "\x1bPtmux;\x1b\x1b[6n\x1b\\",
-        Some(Multiplexer::Screen) => "\x1bP\x1b[6n\x1b\\",
+        None => "\x1b[5n",
+        Some(Multiplexer::Tmux) => "\x1bPtmux;\x1b\x1b[5n\x1b\\",
+        Some(Multiplexer::Screen) => "\x1bP\x1b[5n\x1b\\",
     }
 }
 
@@ -91,7 +91,7 @@ pub fn query_capabilities(
 }
 
 /// Measures the round trip to the terminal outside a multiplexer, if there is one, by a request of
-/// the cursor position.
+/// its status.
 ///
 /// # Errors
 /// Fails if the terminal is closed.
@@ -103,10 +103,10 @@ pub fn query_passthrough(
 ) -> io::Result<()> {
     let Some(multiplexer) = capabilities.environment.multiplexer else { return Ok(()) };
     let sent_at = Instant::now();
-    tty.write(cursor_request(Some(multiplexer)).as_bytes())?;
+    tty.write(status_request(Some(multiplexer)).as_bytes())?;
     listen(input, sent_at + PATIENCE, is_ending, |at, reply| {
         capabilities.learn(reply);
-        let is_reply = matches!(reply, Reply::Cursor { .. });
+        let is_reply = *reply == Reply::Status;
         if is_reply {
             capabilities.passthrough = Some(at.saturating_duration_since(sent_at));
         }
@@ -167,7 +167,7 @@ impl Capabilities {
             Reply::SixelColors(colors) => self.sixel_colors = Some(*colors),
             Reply::SixelSize(size) => self.sixel_px = Some(*size).filter(|px| !px.contains(&0)),
             Reply::CellSize(size) => self.cell_px = Some(*size).filter(|px| !px.contains(&0)),
-            Reply::Cursor { .. } | Reply::Mode { .. } | Reply::Other => {}
+            Reply::Status | Reply::Mode { .. } | Reply::Other => {}
         }
     }
 }

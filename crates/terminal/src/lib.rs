@@ -52,8 +52,8 @@ pub enum Event {
 /// Reply of the terminal to a request of the program.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Reply {
-    /// Position of the cursor, counted from 1 (CPR).
-    Cursor { row: u16, column: u16 },
+    /// Report that the terminal works (DSR).
+    Status,
     /// Numbers of the supported features, such as 4 for sixel (DA1).
     Attributes(Vec<u16>),
     /// State of a private mode of the terminal (DECRPM).

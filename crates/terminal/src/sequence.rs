@@ -110,9 +110,11 @@ fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Opti
         (b"?$", 'y', &[mode, setting]) => Reply::Mode { mode, setting },
         (b"?", 'S', &[1, 0, colors]) => Reply::SixelColors(colors),
         (b"?", 'S', &[2, 0, width, height]) => Reply::SixelSize([width, height]),
-        (b"", 'R', &[row @ (1..), column @ (1..)]) => Reply::Cursor { row, column },
+        (b"", 'n', [0]) => Reply::Status,
         (b"", 't', &[6, height, width]) => Reply::CellSize([width, height]),
         (b"", 'n' | 't' | 'x' | 'c', _) => Reply::Other,
+        // A position of the cursor. In row 1 it may be F3 with modifiers, 2 to 16.
+        (b"", 'R', [(2..), _] | [1, ..2 | 17..]) => Reply::Other,
         (b"", ..) => return key(params, last).map(Event::Key),
         _ => Reply::Other,
     };

@@ -60,6 +60,7 @@ const KEYS: &[(&str, &str)] = &[
     ("\x1b[13;2u", "Shift-Enter"),
     ("\x1b[57;1:1u", "9"),
     ("\x1b[27;5;97~", "Ctrl-a"),
+    ("\x1b[1;2R", "Shift-F3"),
 ];
 
 /// Replies of terminals to requests of this program and of other programs. Some other decoders lose
@@ -133,7 +134,8 @@ fn replies_produce_no_keys() {
 fn replies_are_decoded() {
     let rgb = |r, g, b| Reply::Background([r, g, b]);
     for (bytes, reply) in [
-        ("\x1b[24;80R", Reply::Cursor { row: 24, column: 80 }),
+        ("\x1b[0n", Reply::Status),
+        ("\x1b[24;80R", Reply::Other),
         ("\x1b[?62;4;22c", Reply::Attributes(vec![62, 4, 22])),
         ("\x1b[?2026;2$y", Reply::Mode { mode: 2026, setting: 2 }),
         ("\x1b]11;rgb:1e1e/2020/ffff\x1b\\", rgb(0x1e, 0x20, 0xff)),

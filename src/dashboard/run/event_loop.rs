@@ -3,7 +3,7 @@
 
 use crate::dashboard::run::effects::EffectRunner;
 use crate::dashboard::run::exports::image_upload::ImageUpload;
-use crate::dashboard::run::frames::{DrawOutcome, FramePipeline};
+use crate::dashboard::run::frames::{DrawOutcome, FramePipeline, FrameRequest};
 use crate::dashboard::run::input::{self, Input};
 use crate::dashboard::run::job_control::{ResizeDebounce, TerminalIo, stop_group};
 use crate::dashboard::run::latency::LatencyRecorder;
@@ -34,7 +34,7 @@ pub struct Dashboard {
     pub image_epoch: u64,
     /// Changes of the terminal's size that have not taken effect yet.
     pub resizing: ResizeDebounce,
-    /// Time at which the model last received the connection's status or upload progress.
+    /// Time at which the model last received the connection's rate or upload progress.
     pub status_sent_at: Duration,
     /// `true` if rendering is paused, by the user or because the terminal does not reply.
     pub resting: bool,
@@ -130,7 +130,7 @@ impl Dashboard {
             Event::Key(key) => Message::Key(key),
             Event::Mouse(mouse) => Message::Mouse(mouse),
             Event::Paste(text) => Message::Paste(text),
-            Event::Reply(Reply::Cursor { .. }) => {
+            Event::Reply(Reply::Status) => {
                 self.frames.flow.on_ack(at.saturating_duration_since(self.began));
                 return;
             }
@@ -226,17 +226,16 @@ impl Dashboard {
         self.frames.poll_connection(now);
         if self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
             self.status_sent_at = now;
-            self.dispatch(Message::LinkStatus(self.frames.flow.reading()));
+            self.dispatch(Message::ConnectionRate(self.frames.flow.rate()));
         }
         self.report_upload(now);
         self.frames.follow(&self.model);
         let mut due = None;
         if self.frames.writing_since.is_none() && !self.quit {
-            let answers = self.latency.replies(self.shown);
-            due = self.frames.due(now, self.changed, answers);
+            let request = self.frame_request();
+            due = self.frames.due(now, request);
             if due.is_some_and(|at| at <= now) {
-                let drawn =
-                    self.frames.draw(&self.model, now, self.changed, answers, self.image_epoch);
+                let drawn = self.frames.draw(&self.model, now, request, self.image_epoch);
                 self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
                 match drawn {
                     DrawOutcome::Nothing | DrawOutcome::Deferred | DrawOutcome::Slice => {}
@@ -249,9 +248,8 @@ impl Dashboard {
                     DrawOutcome::Text => self.latency.sent(0),
                     DrawOutcome::Picture => self.latency.sent(self.shown),
                 }
-                let answers = self.latency.replies(self.shown);
                 due = match self.frames.writing_since {
-                    None => self.frames.due(now, self.changed, answers),
+                    None => self.frames.due(now, self.frame_request()),
                     Some(_) => None,
                 };
             }
@@ -260,6 +258,10 @@ impl Dashboard {
         let silent_at = self.rest(now);
         let times = [self.model.next_timeout(), due, measures_at, silent_at];
         times.into_iter().flatten().min().map(|at| at.saturating_sub(now))
+    }
+
+    fn frame_request(&self) -> FrameRequest {
+        FrameRequest { changed: self.changed, answers: self.latency.replies(self.shown) }
     }
 
     /// Reports the progress of an image transfer to the model, at most once per

@@ -46,6 +46,15 @@ pub struct FramePipeline {
     removing: bool,
 }
 
+/// Reason for the next frame.
+#[derive(Clone, Copy)]
+pub struct FrameRequest {
+    /// `true` if the model has changed since the last frame.
+    pub changed: bool,
+    /// `true` if the frame responds to user input.
+    pub answers: bool,
+}
+
 /// Outcome of an attempt to draw and send a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DrawOutcome {
@@ -152,16 +161,15 @@ impl FramePipeline {
     pub fn poll_connection(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.wants_queue_length(now) {
-            self.flow.on_queue_length(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));
+            self.flow.record_queue_length(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));
         }
     }
 
     /// Returns the time at which [`FramePipeline::draw`] must be called next; `None` until the next
-    /// event. `changed` is `true` if the model has changed since the last frame, `answers` is
-    /// `true` if the frame would respond to user input.
-    pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
+    /// event.
+    pub fn due(&self, now: Duration, request: FrameRequest) -> Option<Duration> {
         let pending = self.diff.pending;
-        let text = changed || pending.text || !self.removal.is_empty();
+        let text = request.changed || pending.text || !self.removal.is_empty();
         let may = || self.flow.allowance(now, false).is_some_and(|budget| budget.picture);
         if let Some(upload) = &self.upload
             && (upload.open || !text && upload.follows(pending.visible))
@@ -173,24 +181,24 @@ impl FramePipeline {
             let hidden = pending.hidden?.max(self.flow.refine_at);
             return Some(if may() { hidden } else { hidden.max(self.flow.wakes_at(now, false)) });
         }
-        match self.flow.allowance(now, answers) {
+        match self.flow.allowance(now, request.answers) {
             Some(budget) if budget.picture || text => Some(now),
             _ => Some(self.flow.wakes_at(now, text)),
         }
     }
 
-    /// Draws the model if `changed` is `true`, and sends as many changed cells as the connection
-    /// has room for. `answers` is `true` if the frame responds to user input. Must be called only
-    /// if no frame is being written.
+    /// Draws the model if it has changed, and sends as many changed cells as the connection has
+    /// room for. Must be called only if no frame is being written.
     pub fn draw(
         &mut self,
         model: &Model,
         now: Duration,
-        changed: bool,
-        answers: bool,
+        request: FrameRequest,
         image_epoch: u64,
     ) -> DrawOutcome {
-        let Some(whole) = self.flow.allowance(now, answers) else { return DrawOutcome::Nothing };
+        let Some(whole) = self.flow.allowance(now, request.answers) else {
+            return DrawOutcome::Nothing;
+        };
         let mut budget = whole;
         if let Some(upload) = &self.upload {
             if upload.open {
@@ -199,7 +207,7 @@ impl FramePipeline {
             // The viewed image covers the picture, or is about to.
             budget.picture &= !upload.follows(true);
         }
-        if changed {
+        if request.changed {
             self.redraw(model);
         }
         let target = TargetFrame {

@@ -126,7 +126,7 @@ impl UpdateContext<'_> {
                     viewed.sent = sent;
                 }
             }
-            Message::LinkStatus(link) => self.model.link = link,
+            Message::ConnectionRate(rate) => self.model.connection_rate = rate,
             Message::Tick => {}
         }
     }

@@ -89,8 +89,8 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     for warning in report.warnings() {
         parts.push(part(3, vec![(warning, theme.warn())]));
     }
-    if let Some(link) = &model.link {
-        parts.push(part(6, vec![plain(rate(link.rate))]));
+    if let Some(bytes_per_second) = model.connection_rate {
+        parts.push(part(6, vec![plain(rate(bytes_per_second))]));
     }
     if !watching {
         let plural = if report.threads == 1 { "" } else { "s" };

@@ -77,7 +77,7 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
         return CELLS[shade];
     }
     let [top, bottom] = [upper, lower].map(nearest);
-    let error = |looks: [Oklab; 2]| target[0].distance(looks[0]) + target[1].distance(looks[1]);
+    let error = |halves: [Oklab; 2]| target[0].distance(halves[0]) + target[1].distance(halves[1]);
     let halves_error = error([top, bottom].map(|index| BARE.colors[usize::from(index)]));
     if top != bottom && halves_error + HALVES_GAIN < error([SHADED.colors[shade]; 2]) {
         return PictureCell { glyph: '▀', fg: Color::Indexed(top), bg: Color::Indexed(bottom) };
@@ -92,12 +92,12 @@ pub fn pair_mono(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     });
     let [top, bottom] = [upper, lower].map(|rgb| Oklab::of(rgb).l);
     let target = mixture(upper, lower, 0.5).l;
-    let (glyph, look) = LIGHTNESS
+    let (glyph, lightness) = LIGHTNESS
         .iter()
         .min_by(|a, b| (a.1 - target).abs().total_cmp(&(b.1 - target).abs()))
         .copied()
         .unwrap_or((' ', 0.0));
-    let shade_error = (top - look).abs() + (bottom - look).abs();
+    let shade_error = (top - lightness).abs() + (bottom - lightness).abs();
     let white = LIGHTNESS.last().map_or(1.0, |(_, l)| *l);
     let halves = |glyph, light: f32, dark: f32| {
         let error = (light - white).abs() + dark;

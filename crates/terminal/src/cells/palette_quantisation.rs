@@ -41,7 +41,7 @@ impl QuantisedPalette {
 
     /// Returns the index of the palette colour nearest to `target`, which is not rounded.
     pub fn search(&self, target: Oklab) -> usize {
-        let distances = self.colors.iter().map(|look| target.distance_squared(*look));
+        let distances = self.colors.iter().map(|color| target.distance_squared(*color));
         distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
     }
 }

@@ -16,7 +16,7 @@ struct CellColors {
     /// Cell of the target frame; `None` where text covers the picture.
     target: Option<PictureCell>,
     /// Colours of the halves of the target cell.
-    look: [Oklab; 2],
+    halves: [Oklab; 2],
     /// Colours of the halves on the terminal; `None` if unknown.
     shown: Option<[Oklab; 2]>,
     /// `true` if a difference may count as visible: from a full comparison on, until the cell is
@@ -68,14 +68,14 @@ impl PerceptualDiff {
             let picture = PictureCell::from(cell);
             if cell_colors.target != Some(picture) {
                 cell_colors.target = Some(picture);
-                cell_colors.look = picture.halves();
+                cell_colors.halves = picture.halves();
             }
             if *cell == shown[cell_position] {
-                (cell_colors.shown, cell_colors.counts) = (Some(cell_colors.look), false);
+                (cell_colors.shown, cell_colors.counts) = (Some(cell_colors.halves), false);
                 continue;
             }
             cell_colors.error =
-                cell_colors.shown.map_or(UNKNOWN, |shown| difference(shown, cell_colors.look));
+                cell_colors.shown.map_or(UNKNOWN, |shown| difference(shown, cell_colors.halves));
             cell_colors.counts &= cell_colors.error > threshold;
             cell_colors.visible = cell_colors.counts;
             // Cells with equal colours but different contents are sent last.
@@ -97,7 +97,7 @@ impl PerceptualDiff {
         cell_colors.shown = Some(shown);
         (cell_colors.counts, cell_colors.visible) = (!exact, !exact);
         cell_colors.error =
-            if exact { 0.0 } else { difference(shown, cell_colors.look).max(f32::MIN_POSITIVE) };
+            if exact { 0.0 } else { difference(shown, cell_colors.halves).max(f32::MIN_POSITIVE) };
     }
 
     /// Returns `(difference, index)` of each cell with a visible difference.
@@ -133,10 +133,10 @@ impl PerceptualDiff {
             if cell_colors.visible && colors(cell_colors).is_some() {
                 let (sum, count) = blocks[&block(index)];
                 let [r, g, b] = sum.map(|sum| level(sum / count));
-                let look = [Oklab::of([r, g, b]); 2];
+                let halves = [Oklab::of([r, g, b]); 2];
                 cell = Cell::new(" ");
                 cell.set_bg(Color::Rgb(r, g, b));
-                let gain = cell_colors.error - difference(look, cell_colors.look);
+                let gain = cell_colors.error - difference(halves, cell_colors.halves);
                 if gain > 0.0 {
                     improved.push((gain, index));
                 }

@@ -1,7 +1,7 @@
 //! Flow control: measures the rate of the connection and limits the size of the next frame.
 //!
 //! A slow SSH connection accepts a megabyte at once, but the terminal shows it only many seconds
-//! later. After each frame the program therefore requests the cursor position. The reply
+//! later. After each frame the program therefore requests the terminal's status. The reply
 //! acknowledges the frame, and its time gives the round trip and the rate. A frame holds at most
 //! what the connection carries in 100 ms, and only a few frames are in flight. Without replies from
 //! the terminal, the length of the kernel's TCP send queue is measured instead. If the kernel does
@@ -9,6 +9,7 @@
 //!
 //! The module does no I/O and reads no clock: times and byte counts are arguments.
 
+mod ack_clock;
 mod initial;
 mod send_queue_estimate;
 mod tcp_send_queue;
@@ -16,10 +17,10 @@ mod tcp_send_queue;
 mod tests;
 
 use crate::Multiplexer;
-use crate::capability_query::cursor_request;
+use crate::capability_query::status_request;
+use ack_clock::AckClock;
 pub use initial::InitialLink;
 use send_queue_estimate::SendQueueEstimate;
-use std::collections::VecDeque;
 use std::time::Duration;
 pub use tcp_send_queue::TcpSendQueue;
 
@@ -29,9 +30,10 @@ pub const FRAME_INTERVAL: Duration = Duration::from_millis(33);
 pub const TEXT_INTERVAL: Duration = Duration::from_millis(500);
 /// Time in which the connection should transmit a frame.
 const FRAME_SPAN: Duration = Duration::from_millis(100);
-/// Byte budgets of a frame: `[smallest, initial, largest]`. The initial one applies before the
-/// first measurement.
-const BUDGET: [f64; 3] = [2e3, 8e3, 200e3];
+/// Smallest and largest byte budget of a frame.
+const BUDGET: [f64; 2] = [2e3, 200e3];
+/// Assumed rate in bytes per second before the first measurement.
+const INITIAL_RATE: f64 = 80e3;
 /// Smallest assumed rate in bytes per second. At it a frame of the smallest budget takes one second;
 /// at a rate near 0, after a pause of the connection, the next frame would not be due for minutes.
 const MIN_RATE: f64 = 2e3;
@@ -61,9 +63,6 @@ const DEFAULT_ROUND_TRIP: Duration = Duration::from_millis(100);
 /// Time after which the connection is silent, if bytes wait, none is transmitted, and no input
 /// arrives.
 const SILENT_AFTER: Duration = Duration::from_secs(30);
-/// Longest interval between two acknowledgements that are combined into one measurement. If the
-/// first was delayed, the second alone would give too high a rate.
-const ACKS_TOGETHER: Duration = Duration::from_millis(20);
 /// Assumed rate of a connection that cannot be measured, in bytes per second.
 pub const DEFAULT_RATE: f64 = 30e3;
 /// Share of the rate that refinement may use: the sending of invisible differences.
@@ -94,35 +93,39 @@ pub struct FrameBudget {
     pub refinement: usize,
 }
 
-/// State of the connection, for display.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LinkStatus {
-    /// Bytes per second, measured or fixed.
-    pub rate: f64,
-    pub mode: PacingMode,
+/// State of the method that limits the rate of frames.
+#[derive(Debug, Default)]
+enum Pacing {
+    #[default]
+    Unlimited,
+    AckClocked(AckClock),
+    SendQueue(SendQueueEstimate),
+    FixedRate,
+}
+
+impl Pacing {
+    fn start(mode: PacingMode) -> Self {
+        match mode {
+            PacingMode::Unlimited => Self::Unlimited,
+            PacingMode::AckClocked(multiplexer) => Self::AckClocked(AckClock::new(multiplexer)),
+            PacingMode::SendQueue => Self::SendQueue(SendQueueEstimate::new(INITIAL_RATE / 2.0)),
+            PacingMode::FixedRate => Self::FixedRate,
+        }
+    }
 }
 
 /// Flow control of the connection.
 #[derive(Debug, Default)]
 pub struct FlowControl {
-    mode: PacingMode,
-    /// Method that was suspended because the terminal did not reply, until a reply arrives.
-    suspended_mode: Option<PacingMode>,
+    pacing: Pacing,
+    /// Acknowledgements, suspended because the terminal did not reply, until a reply arrives.
+    suspended: Option<AckClock>,
     start: InitialLink,
     /// Bytes per second, measured or fixed.
     rate: f64,
     /// Shortest round trip since its latest measurement, at `round_trip_at`.
     round_trip: Option<Duration>,
     round_trip_at: Duration,
-    /// Half of the rate at the last measurement of the round trip. With [`PacingMode::SendQueue`],
-    /// a lower rate causes a new measurement: a longer round trip may have lowered the rate,
-    /// because the limit of the queue is derived from the round trip.
-    doubtful_rate: f64,
-    /// Frames in flight, oldest first.
-    in_flight: VecDeque<InFlight>,
-    /// `[time of sending, time of acknowledgement]` of the last acknowledged frame.
-    last_acked: Option<[Duration; 2]>,
-    losses: u32,
     /// Time at which the last period of user activity began.
     active_since: Duration,
     /// Time at which the last period of user activity ends.
@@ -131,64 +134,32 @@ pub struct FlowControl {
     /// Estimated time at which the bytes without acknowledgement request will have been
     /// transmitted.
     free_at: Duration,
-    /// Estimated time at which the frames with acknowledgement request will have been transmitted.
-    clear_at: Duration,
     /// Earliest time of the next refinement.
     pub refine_at: Duration,
-    send_queue: SendQueueEstimate,
-    /// Last measurement of the rate by acknowledgements.
-    ack_sample: Option<AckSample>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct InFlight {
-    sent: Duration,
-    bytes: usize,
-    /// `true` if the frame contains cells of the picture.
-    picture: bool,
-    /// `true` if no other frame was in flight when it was sent.
-    alone: bool,
-}
-
-/// Measurement of the rate by acknowledgements: a number of bytes, the time of the last
-/// acknowledgement, and bounds of the time at which a reply to the first byte could have arrived.
-#[derive(Clone, Copy, Debug)]
-struct AckSample {
-    earliest_start: Duration,
-    latest_start: Duration,
-    /// Time at which the previous frame was sent; `None` if the connection was idle in between.
-    sent_from: Option<Duration>,
-    at: Duration,
-    bytes: usize,
 }
 
 impl FlowControl {
     pub fn new(start: InitialLink) -> Self {
-        let assumed_rate = BUDGET[1] / FRAME_SPAN.as_secs_f64();
+        let is_fixed = start.mode == PacingMode::FixedRate;
         Self {
-            mode: start.mode,
-            rate: match start.mode {
-                PacingMode::FixedRate => start.fixed_rate,
-                _ => assumed_rate,
-            },
+            pacing: Pacing::start(start.mode),
+            rate: if is_fixed { start.fixed_rate } else { INITIAL_RATE },
             round_trip: start.round_trip,
-            doubtful_rate: assumed_rate / 2.0,
             start,
             ..Self::default()
         }
     }
 
-    /// Returns the state of the connection; `None` for a local terminal.
-    pub fn reading(&self) -> Option<LinkStatus> {
-        let status = LinkStatus { rate: self.rate, mode: self.mode };
-        (self.mode != PacingMode::Unlimited).then_some(status)
+    /// Returns the bytes per second, measured or fixed; `None` for a local terminal.
+    pub fn rate(&self) -> Option<f64> {
+        (!matches!(self.pacing, Pacing::Unlimited)).then_some(self.rate)
     }
 
     /// Returns the OKLab distance above which a difference is visible, larger for slower
     /// connections.
     pub fn threshold(&self) -> f32 {
-        match self.mode {
-            PacingMode::Unlimited => 0.0,
+        match self.pacing {
+            Pacing::Unlimited => 0.0,
             // 10 Mbit/s and 300 kbit/s.
             _ if self.rate > 1.25e6 => 0.01,
             _ if self.rate < 37.5e3 => 0.04,
@@ -207,14 +178,12 @@ impl FlowControl {
 
     /// Returns the acknowledgement request to send after a frame, if there is one.
     pub fn ack_request(&self) -> Option<&'static str> {
-        match self.mode {
-            PacingMode::AckClocked(multiplexer) => Some(cursor_request(multiplexer)),
-            _ => None,
-        }
+        let Pacing::AckClocked(clock) = &self.pacing else { return None };
+        Some(status_request(clock.multiplexer))
     }
 
     /// Returns `true` if the caller should now measure the send queue for
-    /// [`FlowControl::on_queue_length`].
+    /// [`FlowControl::record_queue_length`].
     pub fn wants_queue_length(&self, now: Duration) -> bool {
         self.measures_at(now).is_some_and(|at| at <= now)
     }
@@ -222,19 +191,19 @@ impl FlowControl {
     /// Returns the time of the next measurement of the send queue; `None` if it is empty or does
     /// not limit the frames.
     pub fn measures_at(&self, now: Duration) -> Option<Duration> {
-        if self.mode != PacingMode::SendQueue {
-            return None;
-        }
-        let is_stalled = self.send_queue.stalled_since().is_some_and(|at| at + LOST_AFTER <= now);
-        self.send_queue.next_at(if is_stalled { STALLED_INTERVAL } else { QUEUE_INTERVAL })
+        let Pacing::SendQueue(queue) = &self.pacing else { return None };
+        let is_stalled = queue.stalled_since().is_some_and(|at| at + LOST_AFTER <= now);
+        queue.next_at(if is_stalled { STALLED_INTERVAL } else { QUEUE_INTERVAL })
     }
 
     /// Returns the time from which the connection is silent, unless bytes are transmitted or input
     /// arrives before; `None` if no bytes wait. `blocked_since` is the start of a write that has
     /// not returned.
     pub fn silent_at(&self, blocked_since: Option<Duration>) -> Option<Duration> {
-        let is_measured = self.mode == PacingMode::SendQueue;
-        let stalled_since = self.send_queue.stalled_since().filter(|_| is_measured);
+        let stalled_since = match &self.pacing {
+            Pacing::SendQueue(queue) => queue.stalled_since(),
+            Pacing::Unlimited | Pacing::AckClocked(_) | Pacing::FixedRate => None,
+        };
         let since = stalled_since.into_iter().chain(blocked_since).min()?;
         Some(since.max(self.active_until) + SILENT_AFTER)
     }
@@ -249,11 +218,15 @@ impl FlowControl {
             let refinement = if self.refine_at <= now { bytes / 2 } else { 0 };
             return Some(FrameBudget { bytes, picture: true, refinement });
         }
-        let texts = self.in_flight.iter().filter(|frame| !frame.picture);
-        let text_bytes = MAX_TEXT.saturating_sub(texts.map(|frame| frame.bytes).sum());
-        let may_send_text =
-            self.mode != PacingMode::FixedRate || self.free_at <= now + 2 * FRAME_SPAN;
-        let due = due(TEXT_INTERVAL) && may_send_text && text_bytes >= MAX_TEXT / 4;
+        let text_bytes = match &self.pacing {
+            Pacing::AckClocked(clock) => {
+                let texts = clock.in_flight.iter().filter(|frame| !frame.picture);
+                MAX_TEXT.saturating_sub(texts.map(|frame| frame.bytes).sum())
+            }
+            Pacing::FixedRate if self.free_at > now + 2 * FRAME_SPAN => 0,
+            Pacing::Unlimited | Pacing::SendQueue(_) | Pacing::FixedRate => MAX_TEXT,
+        };
+        let due = due(TEXT_INTERVAL) && text_bytes >= MAX_TEXT / 4;
         due.then_some(FrameBudget { bytes: text_bytes, picture: false, refinement: 0 })
     }
 
@@ -262,20 +235,17 @@ impl FlowControl {
     pub fn wakes_at(&self, now: Duration, text: bool) -> Duration {
         let after = |interval| self.last_frame.map_or(now, |last| last + interval);
         let frame = after(FRAME_INTERVAL);
-        let room = match self.mode {
-            PacingMode::Unlimited => frame,
-            PacingMode::AckClocked(_) if self.has_room(now, false) => frame,
-            PacingMode::AckClocked(_) if self.free_at > now => frame.max(self.free_at),
-            PacingMode::AckClocked(_) if now < self.active_until.min(self.clear_at) => {
-                frame.max(self.clear_at)
+        let room = match &self.pacing {
+            _ if self.has_room(now, false) => frame,
+            Pacing::Unlimited => frame,
+            Pacing::AckClocked(_) if self.free_at > now => frame.max(self.free_at),
+            Pacing::AckClocked(clock) if now < self.active_until.min(clock.clear_at) => {
+                frame.max(clock.clear_at)
             }
             // By this time the oldest frame is acknowledged or lost.
-            PacingMode::AckClocked(_) => self.lost_at().unwrap_or(frame),
-            PacingMode::SendQueue => {
-                let due = self.measures_at(now).unwrap_or(now);
-                if self.has_room(now, false) { frame } else { frame.max(due) }
-            }
-            PacingMode::FixedRate => frame.max(self.free_at),
+            Pacing::AckClocked(clock) => clock.lost_at().unwrap_or(frame),
+            Pacing::SendQueue(_) => frame.max(self.measures_at(now).unwrap_or(now)),
+            Pacing::FixedRate => frame.max(self.free_at),
         };
         let at = if text { room.min(after(TEXT_INTERVAL)) } else { room };
         if at > now { at } else { now + QUEUE_INTERVAL }
@@ -288,24 +258,19 @@ impl FlowControl {
         if flushed > 0 {
             self.refine_at = now + seconds(flushed, REFINEMENT_SHARE * self.rate);
         }
-        match self.mode {
-            PacingMode::Unlimited => {}
-            PacingMode::AckClocked(_) => {
-                self.clear_at = self.clear_at.max(now) + seconds(bytes, self.rate);
-                let alone = self.in_flight.is_empty();
-                self.in_flight.push_back(InFlight { sent: now, bytes, picture, alone });
-            }
-            PacingMode::SendQueue => self.send_queue.sent(now, bytes, self.max_queue()),
-            PacingMode::FixedRate => {
-                self.free_at = self.free_at.max(now) + seconds(bytes, self.rate)
-            }
+        let (duration, limit) = (seconds(bytes, self.rate), self.max_queue());
+        match &mut self.pacing {
+            Pacing::Unlimited => {}
+            Pacing::AckClocked(clock) => clock.sent(now, bytes, picture, duration),
+            Pacing::SendQueue(queue) => queue.sent(now, bytes, limit),
+            Pacing::FixedRate => self.free_at = self.free_at.max(now) + duration,
         }
     }
 
     /// Records bytes that end inside an escape sequence, where no request can be inserted. The time
     /// of their transmission is estimated.
     pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
-        if let PacingMode::AckClocked(_) = self.mode {
+        if let Pacing::AckClocked(_) = self.pacing {
             self.last_frame = Some(now);
             let duration = Duration::from_secs_f64(bytes as f64 / self.rate);
             self.free_at = self.free_at.max(now) + duration;
@@ -314,83 +279,28 @@ impl FlowControl {
         }
     }
 
-    /// Records a reply, which acknowledges the oldest frame in flight or resumes a suspended mode.
-    /// Returns `false` if there was neither.
+    /// Records a reply, which acknowledges the oldest frame in flight or resumes suspended
+    /// acknowledgements. Returns `false` if there was neither.
     pub fn on_ack(&mut self, at: Duration) -> bool {
-        if let Some(mode) = self.suspended_mode.take() {
-            // The connection has been interrupted.
-            self.mode = mode;
+        if let Some(clock) = self.suspended.take() {
+            self.pacing = Pacing::AckClocked(clock.resumed());
             self.rate = self.rate.min(self.start.fixed_rate);
-            self.forget_frames();
-            self.losses = 0;
             return true;
         }
-        let Some(frame) = self.in_flight.pop_front() else { return false };
-        let last_acked = self.last_acked.replace([frame.sent, at]);
-        self.losses = 0;
-        if self.in_flight.is_empty() {
-            self.clear_at = self.clear_at.min(at);
-        }
+        let (needs_round_trip, budget) = (self.needs_round_trip(at), self.budget());
+        let Pacing::AckClocked(clock) = &mut self.pacing else { return false };
+        let Some(frame) = clock.acknowledged(at) else { return false };
         let elapsed = at.saturating_sub(frame.sent);
-        if frame.alone && frame.bytes <= SMALL && self.needs_round_trip(at) {
+        if frame.alone && frame.bytes <= SMALL && needs_round_trip {
             self.round_trip = Some(elapsed);
             self.round_trip_at = at;
         }
         let known = self.round_trip.filter(|least| *least <= elapsed);
         self.round_trip = self.round_trip.map(|least| least.min(elapsed));
-        self.measure_rate(frame, at, last_acked, known);
-        true
-    }
-
-    /// Updates the rate by the acknowledgement of `frame` at `at`. `last_acked` has the times of
-    /// the frame acknowledged before. `known` is the known round trip; `None` if it is unknown or
-    /// longer than that of `frame`.
-    fn measure_rate(
-        &mut self,
-        frame: InFlight,
-        at: Duration,
-        last_acked: Option<[Duration; 2]>,
-        known: Option<Duration>,
-    ) {
-        // The rate is the number of bytes divided by the time in which replies to them could
-        // arrive. This time begins 0.9 to 1 round trips after the frame was sent, but not before
-        // the previous acknowledgement. It ends with this acknowledgement.
-        let idle_start =
-            |round_trips: f64| frame.sent + known.unwrap_or_default().mul_f64(round_trips);
-        let previous = last_acked.filter(|[_, acked_at]| *acked_at > idle_start(0.9));
-        let start = |round_trips: f64| {
-            let start = idle_start(round_trips);
-            previous.map_or(start, |[_, acked_at]| start.max(acked_at))
-        };
-        let sample = match self.ack_sample {
-            Some(last) if at <= last.at + ACKS_TOGETHER => {
-                AckSample { at, bytes: last.bytes + frame.bytes, ..last }
-            }
-            _ => AckSample {
-                earliest_start: start(0.9),
-                latest_start: if known.is_some() { start(1.0) } else { at },
-                sent_from: previous.map(|[sent, _]| sent),
-                at,
-                bytes: frame.bytes,
-            },
-        };
-        self.ack_sample = Some(sample);
-        // Two acknowledgements may arrive closer together than the frames were sent.
-        let sending = sample.sent_from.map(|from| frame.sent.saturating_sub(from));
-        let longest = at.saturating_sub(sample.earliest_start).max(sending.unwrap_or_default());
-        let shortest = at.saturating_sub(sample.latest_start);
-        let rate = |span: Duration| {
-            sample.bytes as f64 / span.max(Duration::from_millis(10)).as_secs_f64()
-        };
-        // The known rate is kept if it is between both bounds; otherwise the nearer bound replaces
-        // it.
-        let rate = self.rate.clamp(rate(longest), rate(shortest.min(longest)));
-        if sample.bytes >= SMALL || rate > self.rate {
-            let is_full = 2 * sample.bytes >= self.budget() || shortest > 2 * FRAME_SPAN;
-            if is_full || rate > self.rate {
-                self.average_rate(rate);
-            }
+        if let Some(rate) = clock.measure(frame, at, known, self.rate, budget) {
+            self.average_rate(rate);
         }
+        true
     }
 
     /// Includes `rate`, just measured, in the average.
@@ -400,20 +310,18 @@ impl FlowControl {
     }
 
     /// Records the number of bytes in the send queue; `None` if the kernel no longer reports it.
-    pub fn on_queue_length(&mut self, now: Duration, bytes: Option<usize>) {
-        let Some(bytes) = bytes else {
-            self.stop_requests(PacingMode::FixedRate, now);
-            return;
-        };
-        let (limit, round_trip) = (self.max_queue(), self.round_trip);
-        let sample = self.send_queue.measured(now, bytes, limit, round_trip);
-        if let Some((elapsed, bytes)) = sample.round_trip {
-            if bytes <= SMALL && self.needs_round_trip(now) {
-                self.round_trip = Some(elapsed);
+    pub fn record_queue_length(&mut self, now: Duration, bytes: Option<usize>) {
+        let Some(bytes) = bytes else { return self.fall_back(PacingMode::FixedRate, now) };
+        let (limit, needs_round_trip) = (self.max_queue(), self.needs_round_trip(now));
+        let Pacing::SendQueue(queue) = &mut self.pacing else { return };
+        let sample = queue.measured(now, bytes, limit, self.round_trip);
+        if let Some(alone) = sample.alone {
+            if alone.bytes <= SMALL && needs_round_trip {
+                self.round_trip = Some(alone.round_trip);
                 self.round_trip_at = now;
-                self.doubtful_rate = self.rate / 2.0;
+                queue.doubtful_rate = self.rate / 2.0;
             }
-            self.round_trip = self.round_trip.map(|least| least.min(elapsed));
+            self.round_trip = self.round_trip.map(|least| least.min(alone.round_trip));
         }
         if let Some(rate) = sample.rate
             && (sample.is_full || rate > self.rate)
@@ -424,31 +332,38 @@ impl FlowControl {
 
     /// Treats all frames in flight as lost if the oldest acknowledgement is overdue.
     pub fn expire(&mut self, now: Duration) {
-        if self.lost_at().is_none_or(|at| at > now) {
+        let Pacing::AckClocked(clock) = &mut self.pacing else { return };
+        if clock.lost_at().is_none_or(|at| at > now) {
             return;
         }
-        self.forget_frames();
+        clock.forget_frames();
+        clock.losses += 1;
+        let is_interrupted = clock.losses >= MAX_LOSSES;
         self.rate = (self.rate / 2.0).max(MIN_RATE);
-        self.losses += 1;
-        if self.losses >= MAX_LOSSES {
-            let fallback =
-                if self.start.queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
-            self.stop_requests(fallback, now);
+        if is_interrupted {
+            let has_queue = self.start.queue;
+            let mode = if has_queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
+            self.fall_back(mode, now);
         }
     }
 
     /// Returns the longest time to wait for outstanding replies at the end of the program; `None` if
     /// there are none.
     pub fn awaits(&self) -> Option<Duration> {
-        let is_waiting = !self.in_flight.is_empty() || self.suspended_mode.is_some();
+        let is_waiting = match &self.pacing {
+            Pacing::AckClocked(clock) => !clock.in_flight.is_empty(),
+            Pacing::Unlimited | Pacing::SendQueue(_) | Pacing::FixedRate => {
+                self.suspended.is_some()
+            }
+        };
         is_waiting.then(|| 2 * self.round_trip.unwrap_or_default() + 2 * FRAME_SPAN)
     }
 
     /// Returns the largest number of bytes of the next frame.
     fn budget(&self) -> usize {
-        match self.mode {
-            PacingMode::Unlimited => usize::MAX,
-            _ => (self.rate * FRAME_SPAN.as_secs_f64()).clamp(BUDGET[0], BUDGET[2]) as usize,
+        match self.pacing {
+            Pacing::Unlimited => usize::MAX,
+            _ => (self.rate * FRAME_SPAN.as_secs_f64()).clamp(BUDGET[0], BUDGET[1]) as usize,
         }
     }
 
@@ -460,30 +375,28 @@ impl FlowControl {
         let is_first = |last: Option<Duration>| {
             is_active && answers && last.is_some_and(|at| at < self.active_since)
         };
-        match self.mode {
-            PacingMode::Unlimited => true,
-            PacingMode::AckClocked(_) if self.free_at > now => false,
-            PacingMode::AckClocked(_) => {
-                if self.needs_round_trip(now) {
-                    return self.in_flight.is_empty();
-                }
+        match &self.pacing {
+            Pacing::Unlimited => true,
+            Pacing::AckClocked(_) if self.free_at > now => false,
+            Pacing::AckClocked(clock) if self.needs_round_trip(now) => clock.in_flight.is_empty(),
+            Pacing::AckClocked(clock) => {
                 // While the user is active and the connection busy, the effect of an input waits
                 // for at most the frame in transmission.
-                let limit = match is_active && self.clear_at > now {
+                let limit = match is_active && clock.clear_at > now {
                     true => 1 + usize::from(answers),
                     false => self.target_in_flight(),
                 };
-                let pictures = self.in_flight.iter().filter(|frame| frame.picture).count();
-                is_first(self.in_flight.back().map(|frame| frame.sent)) || pictures < limit
+                let pictures = clock.in_flight.iter().filter(|frame| frame.picture).count();
+                is_first(clock.in_flight.back().map(|frame| frame.sent)) || pictures < limit
             }
-            PacingMode::SendQueue if self.needs_round_trip(now) => self.send_queue.bytes == 0.0,
-            PacingMode::SendQueue => {
+            Pacing::SendQueue(queue) if self.needs_round_trip(now) => queue.bytes == 0.0,
+            Pacing::SendQueue(queue) => {
                 let extra = if is_first(self.last_frame) { self.budget() as f64 } else { 0.0 };
                 // With a shorter queue, the effect of an input waits for fewer bytes.
                 let spare = if is_active { self.budget() as f64 / 2.0 } else { 0.0 };
-                self.send_queue.bytes < self.max_queue() + extra - spare
+                queue.bytes < self.max_queue() + extra - spare
             }
-            PacingMode::FixedRate => {
+            Pacing::FixedRate => {
                 let lead = if answers { FRAME_SPAN } else { Duration::ZERO };
                 self.free_at <= now + lead
             }
@@ -504,34 +417,25 @@ impl FlowControl {
         (1 + round_trips.round() as usize).clamp(2, MAX_IN_FLIGHT)
     }
 
-    /// Returns `true` if the next frame should measure the round trip. It should if the rate is
-    /// below `doubtful_rate`, or if the last measurement is missing or old and the user inactive.
+    /// Returns `true` if the next frame should measure the round trip: the last measurement is
+    /// missing or old and the user inactive, or the rate of the send queue is doubtful.
     fn needs_round_trip(&self, now: Duration) -> bool {
         let is_known = self.round_trip.is_some() && now < self.round_trip_at + ROUND_TRIP_INTERVAL;
-        let is_measurable = matches!(self.mode, PacingMode::AckClocked(_) | PacingMode::SendQueue);
-        let is_doubtful = self.mode == PacingMode::SendQueue && self.rate < self.doubtful_rate;
-        is_measurable && (is_doubtful || !is_known && now >= self.active_until)
-    }
-
-    fn lost_at(&self) -> Option<Duration> {
-        self.in_flight.front().map(|frame| frame.sent + LOST_AFTER)
-    }
-
-    fn forget_frames(&mut self) {
-        self.in_flight.clear();
-        self.last_acked = None;
-    }
-
-    /// Changes to `mode`, which requests no acknowledgements. A mode that requests them is
-    /// suspended.
-    fn stop_requests(&mut self, mode: PacingMode, now: Duration) {
-        if matches!(self.mode, PacingMode::AckClocked(_)) {
-            self.suspended_mode = Some(self.mode);
+        let is_due = !is_known && now >= self.active_until;
+        match &self.pacing {
+            Pacing::Unlimited | Pacing::FixedRate => false,
+            Pacing::AckClocked(_) => is_due,
+            Pacing::SendQueue(queue) => is_due || self.rate < queue.doubtful_rate,
         }
-        self.mode = mode;
+    }
+
+    /// Changes to `mode`, which requests no acknowledgements, until a late one arrives.
+    fn fall_back(&mut self, mode: PacingMode, now: Duration) {
+        let before = std::mem::replace(&mut self.pacing, Pacing::start(mode));
+        if let Pacing::AckClocked(clock) = before {
+            self.suspended = Some(clock);
+        }
         self.free_at = now;
-        self.ack_sample = None;
-        self.send_queue = SendQueueEstimate::default();
         if mode == PacingMode::FixedRate {
             self.rate = self.start.fixed_rate;
         }

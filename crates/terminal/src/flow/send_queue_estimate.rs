@@ -24,23 +24,43 @@ pub struct SendQueueEstimate {
     /// Time at which the last frame was sent.
     sent_at: Duration,
     busy: Option<Busy>,
-    /// Beginning, as in [`Busy`], of a measurement of the rate that was shorter than [`SAMPLE`].
-    /// The next busy period may continue it.
-    short_sample: Option<(Duration, f64)>,
+    /// Beginning of a measurement of the rate that was shorter than [`SAMPLE`]. The next busy period
+    /// may continue it.
+    short_sample: Option<SampleStart>,
+    /// Half of the rate at the last measurement of the round trip. A lower rate causes a new
+    /// measurement: a longer round trip may have lowered the rate, because the limit of the queue is
+    /// derived from the round trip.
+    pub doubtful_rate: f64,
 }
 
-/// Time in which the queue is not empty. The beginning of a measurement of the rate is a time, with
-/// the bytes that had left the queue in total.
+/// Beginning of a measurement of the rate.
+#[derive(Clone, Copy, Debug)]
+struct SampleStart {
+    at: Duration,
+    /// Bytes that had left the queue in total.
+    drained: f64,
+}
+
+impl SampleStart {
+    /// Returns the mean rate until `now`, when `drained` bytes have left the queue in total. `None`
+    /// for a time shorter than [`SAMPLE`].
+    fn rate(self, now: Duration, drained: f64) -> Option<f64> {
+        let span = now.saturating_sub(self.at);
+        (span >= SAMPLE).then(|| (drained - self.drained) / span.as_secs_f64())
+    }
+}
+
+/// Time in which the queue is not empty.
 #[derive(Debug)]
 struct Busy {
     since: Duration,
     /// Beginning of the measurement over the whole period. It includes the previous period if that
     /// was too short and began less than [`SAMPLE`] before this one.
-    whole: (Duration, f64),
+    whole: SampleStart,
     /// Bytes of the only frame of the period; `None` for several.
     alone: Option<usize>,
     /// Beginning of the current measurement.
-    sample: Option<(Duration, f64)>,
+    sample: Option<SampleStart>,
     /// `true` if the queue has held as many bytes as flow control permits since the current
     /// measurement began. Bytes then left the queue at the rate of the connection.
     is_full: bool,
@@ -53,25 +73,36 @@ struct Busy {
 /// Result of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct QueueSample {
-    /// Time until the queue was empty again, and number of bytes sent, in a busy period with a
-    /// single frame. `None` for other busy periods.
-    pub round_trip: Option<(Duration, usize)>,
+    /// Only frame of a busy period that has ended. `None` for several frames.
+    pub alone: Option<LoneFrame>,
     /// Bytes per second that left the queue.
     pub rate: Option<f64>,
     /// `true` if `rate` is the rate of the connection; if `false`, the connection may be faster.
     pub is_full: bool,
 }
 
+/// Frame that was sent when the queue was empty, and whose bytes have left it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoneFrame {
+    pub bytes: usize,
+    /// Time until the queue was empty again.
+    pub round_trip: Duration,
+}
+
 impl SendQueueEstimate {
+    pub fn new(doubtful_rate: f64) -> Self {
+        Self { doubtful_rate, ..Self::default() }
+    }
+
     /// Records that a frame was sent. `limit` is the number of bytes of a full queue.
     pub fn sent(&mut self, now: Duration, bytes: usize, limit: f64) {
         let alone = self.busy.is_none().then_some(bytes);
         let busy = self.busy.get_or_insert_with(|| {
             let continued = self.short_sample.take();
-            let continued = continued.filter(|(start, _)| now < *start + SAMPLE);
+            let continued = continued.filter(|start| now < start.at + SAMPLE);
             Busy {
                 since: now,
-                whole: continued.unwrap_or((now, self.sent)),
+                whole: continued.unwrap_or(SampleStart { at: now, drained: self.sent }),
                 alone,
                 sample: None,
                 is_full: false,
@@ -128,12 +159,10 @@ impl SendQueueEstimate {
         busy.is_full |= self.bytes >= limit;
         // Pauses lower the rate over the whole period but cannot raise it. In a short period, a
         // relay or the buffers of the other host may have taken the bytes at once.
-        let (start, before) = busy.whole;
-        let span = now.saturating_sub(start);
-        let whole = (span >= SAMPLE).then(|| (drained - before) / span.as_secs_f64());
+        let whole = busy.whole.rate(now, drained);
         if bytes == 0 {
             let sample = QueueSample {
-                round_trip: busy.alone.map(|bytes| (now - busy.since, bytes)),
+                alone: busy.alone.map(|bytes| LoneFrame { bytes, round_trip: now - busy.since }),
                 rate: whole,
                 is_full: false,
             };
@@ -141,18 +170,15 @@ impl SendQueueEstimate {
             self.busy = None;
             return sample;
         }
-        let Some((start, before)) = busy.sample else {
-            busy.sample = is_progress.then_some((now, drained));
+        let start = SampleStart { at: now, drained };
+        let Some(before) = busy.sample else {
+            busy.sample = is_progress.then_some(start);
             return QueueSample::default();
         };
-        let span = now.saturating_sub(start);
-        if span < SAMPLE {
-            return QueueSample::default();
-        }
+        let Some(full_rate) = before.rate(now, drained) else { return QueueSample::default() };
+        busy.sample = Some(start);
         let is_full = std::mem::replace(&mut busy.is_full, self.bytes >= limit);
-        let rate =
-            if is_full { Some((drained - before).max(0.0) / span.as_secs_f64()) } else { whole };
-        busy.sample = Some((now, drained));
-        QueueSample { round_trip: None, rate, is_full }
+        let rate = if is_full { Some(full_rate.max(0.0)) } else { whole };
+        QueueSample { alone: None, rate, is_full }
     }
 }

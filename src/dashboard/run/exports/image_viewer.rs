@@ -23,7 +23,7 @@ pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
     let cell_px = cell_px().or(terminal.cell_px);
     let protocol = Protocol::of(&Capabilities { cell_px, ..terminal.clone() });
     // A local terminal has no limit.
-    let rate = frames.flow.reading().map(|link| link.rate);
+    let rate = frames.flow.rate();
     let max_bytes = rate.map(|rate| rate * MAX_TRANSFER_TIME.as_secs_f64());
     ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, max_bytes }
 }
