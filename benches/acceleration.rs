@@ -48,7 +48,7 @@ impl Bench {
         let world = AnyWorld::compile(&scene, &Options::default());
         let (scales, mix) = (
             world.info().scales.clone(),
-            LightWeights { weights: world.info().groups.mix(&scene) },
+            LightWeights { weights: world.info().groups.weights(&scene) },
         );
         let estimator = Estimator::new(&scales, &mix, &Display::default());
         let [width, height] = size.map(|n| n as usize);

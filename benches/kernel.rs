@@ -187,7 +187,7 @@ fn wave(c: &mut Criterion) {
         let world = AnyWorld::compile(&scene, &Options { precision, ..Options::default() });
         let (scales, mix) = (
             world.info().scales.clone(),
-            LightWeights { weights: world.info().groups.mix(&scene) },
+            LightWeights { weights: world.info().groups.weights(&scene) },
         );
         let estimator = Estimator::new(&scales, &mix, &Display::default());
         let header = Header {

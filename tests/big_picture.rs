@@ -54,7 +54,7 @@ fn big_picture_has_the_pixels_of_single_rays() {
     let path = std::env::var_os("ZERKALO_PICTURE").map(PathBuf::from).expect("a picture");
     let scene = sized(shipped("mirror-room-physical.toml"), [SIDE; 2]);
     let world = AnyWorld::compile(&scene, &Options::default());
-    let mix = LightWeights { weights: world.info().groups.mix(&scene) };
+    let mix = LightWeights { weights: world.info().groups.weights(&scene) };
     let AnyWorld::Double(world) = &world else { panic!("double precision is expected") };
     let decoder = png::Decoder::new(BufReader::new(File::open(path).unwrap()));
     let mut reader = decoder.read_info().unwrap();

@@ -59,7 +59,7 @@ fn light_weights_replace_retracing() {
         let rendering = rendered(&before, 4, precision, 8);
         let unchanged = picture(&rendering, Replicates::Both).concat();
         for (what, after) in &changes {
-            let mix = LightWeights { weights: rendering.world.info().groups.mix(after) };
+            let mix = LightWeights { weights: rendering.world.info().groups.weights(after) };
             let mut mixed = Vec::new();
             for y in 0..rendering.film.height() {
                 mixed.extend(rendering.film.row(y, Replicates::Both, &mix).concat());

@@ -112,7 +112,7 @@ impl Traced {
             AnyWorld::Single(w) => w.camera.eye,
             AnyWorld::Double(w) => w.camera.eye,
         };
-        let weights = world.info().groups.mix(scene);
+        let weights = world.info().groups.weights(scene);
         Self { world, weights, origin: DVec3::from(scene.camera.eye) - eye }
     }
 

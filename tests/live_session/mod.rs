@@ -115,7 +115,7 @@ fn light_changes_keep_samples() {
     session.set_view(View { raster: Some([10, 7]), probe: None });
     let before = finish(&mut session, &scene());
     let newer = relit();
-    let mix = before.mix_for(&newer).expect("the film serves the scene");
+    let mix = before.weights_for(&newer).expect("the film serves the scene");
     let generation = session.set_scene(Arc::new(newer.clone()));
     // All snapshots after the light change contain all samples of the first render.
     let after = wait(&session, |s| {
@@ -140,7 +140,7 @@ fn light_changes_keep_samples() {
     // A moved light needs new samples.
     let mut moved = newer;
     moved.lights[0].position_mut().unwrap()[0] = 1.0;
-    assert_eq!(after.lighting.unwrap().mix(&moved), None);
+    assert_eq!(after.lighting.unwrap().weights(&moved), None);
     session.set_stop(spp_stop(16));
     let generation = session.set_scene(Arc::new(moved));
     let first = wait(&session, |s| s.report.generation == generation);

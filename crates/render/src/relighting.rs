@@ -16,9 +16,9 @@ impl Relighting {
     /// Returns the light weights with which the film shows `scene`. Returns `None` if `scene` needs
     /// new samples, because it differs in more than the colours, intensities and switches of
     /// sources that have light groups of their own.
-    pub fn mix(&self, scene: &Scene) -> Option<LightWeights> {
+    pub fn weights(&self, scene: &Scene) -> Option<LightWeights> {
         let can_reuse =
             std::ptr::eq(scene, &*self.compiled) || self.groups.can_reuse(&self.compiled, scene);
-        can_reuse.then(|| LightWeights { weights: self.groups.mix(scene) })
+        can_reuse.then(|| LightWeights { weights: self.groups.weights(scene) })
     }
 }

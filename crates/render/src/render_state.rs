@@ -94,7 +94,7 @@ impl RenderState {
             seed: options.sampling.seed,
             precision: world.info().precision.to_string(),
         };
-        let weights = LightWeights { weights: world.info().groups.mix(&scene) };
+        let weights = LightWeights { weights: world.info().groups.weights(&scene) };
         let estimator = Estimator::new(&header.scales, &weights, &options.display);
         let film = Film::try_new(header, previous);
         let film = film.map_err(|_| memory_budget::refused(size, groups))?;
@@ -116,7 +116,8 @@ impl RenderState {
     /// Makes the film a picture of `scene` and returns `true`. Returns `false`, without a change,
     /// if `scene` has faults or the samples are not valid for it.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
-        let Some(weights) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
+        let Some(weights) = self.lighting.weights(scene).filter(|_| scene.faults().is_empty())
+        else {
             return false;
         };
         self.weights = weights;

@@ -147,10 +147,9 @@ fn round_up(value: f64) -> f64 {
 /// Returns the latest picture, with the present weights of the light groups.
 fn beauty(model: &Model, snapshot: &Snapshot, size: [usize; 2]) -> Option<Raster> {
     let picture = snapshot.picture.as_ref()?;
-    let weights = snapshot.mix_for(model.scene());
-    let radiance = picture.mixed(weights.as_ref().unwrap_or(&snapshot.weights));
-    let live = displayed(&radiance, &model.display, [picture.cols, picture.rows]);
-    Some(resized(live, size))
+    let newest = snapshot.weights_for(model.scene());
+    let mixed = picture.mixed(newest.as_ref().unwrap_or(&snapshot.weights));
+    Some((mixed, [picture.cols, picture.rows]))
 }
 
 /// Returns a raster of the first hits in the colours `color`, and [`NO_HIT`] for rays without a

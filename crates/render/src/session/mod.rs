@@ -135,10 +135,10 @@ impl Session {
     }
 
     /// Renders `scene` from now on, with the present samples if they are valid for it (see
-    /// [`Relighting::mix`]). Returns the generation of the scene, a number that its reports
+    /// [`Relighting::weights`]). Returns the generation of the scene, a number that its reports
     /// contain; it increases with each scene.
     ///
-    /// [`Relighting::mix`]: crate::Relighting::mix
+    /// [`Relighting::weights`]: crate::Relighting::weights
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> u64 {
         self.begin(|generation| Command::Scene(generation, scene))
     }

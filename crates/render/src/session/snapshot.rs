@@ -31,7 +31,7 @@ pub struct Snapshot {
     pub picture: Option<Thumbnail>,
     /// Light weights of the scene of the report.
     pub weights: LightWeights,
-    /// Light groups of the film, for [`Snapshot::mix_for`].
+    /// Light groups of the film, for [`Snapshot::weights_for`].
     pub lighting: Option<Arc<Relighting>>,
     /// First hits of the requested size. `None` before the first complete picture if they would
     /// delay it too much.
@@ -45,8 +45,8 @@ pub struct Snapshot {
 impl Snapshot {
     /// Returns the light weights with which this picture shows `scene`, which may be newer than the
     /// snapshot. Returns `None` if `scene` needs new samples.
-    pub fn mix_for(&self, scene: &Scene) -> Option<LightWeights> {
-        self.lighting.as_ref()?.mix(scene)
+    pub fn weights_for(&self, scene: &Scene) -> Option<LightWeights> {
+        self.lighting.as_ref()?.weights(scene)
     }
 
     /// Adds what the client has requested of `film`. `estimates` are the errors of the tiles, or

@@ -166,7 +166,7 @@ impl LightGroups {
     /// Returns the factors by which the film's sums of each group are multiplied in the picture of
     /// `scene`, which may differ from the compiled scene in emissions and on/off switches, ambient
     /// light and background.
-    pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
+    pub fn weights(&self, scene: &Scene) -> Vec<[f64; 3]> {
         let weight = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => scene.ambient.color.0,
             LightGroupSource::Background => scene.background.color.0,
@@ -364,7 +364,7 @@ mod tests {
         let groups = LightGroups::new(&scene, (true, false), false);
         assert_eq!(groups.members, [LightGroupSource::Material("lamp".to_string())]);
         assert_eq!(groups.names(&scene), ["lamp"]);
-        assert_eq!(groups.mix(&scene), [[4.0; 3]]);
+        assert_eq!(groups.weights(&scene), [[4.0; 3]]);
         let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
         fn lamp(scene: &mut Scene) -> &mut Material {
             scene.materials.get_mut("lamp").unwrap()
@@ -385,7 +385,7 @@ mod tests {
         }));
         let mut dark = scene.clone();
         lamp(&mut dark).emission = 0.0;
-        assert_eq!(groups.mix(&dark), [[0.0; 3]]);
+        assert_eq!(groups.weights(&dark), [[0.0; 3]]);
         assert!(!LightGroups::new(&dark, (true, false), false).can_reuse(&dark, &scene));
     }
 
