@@ -1,10 +1,11 @@
 //! OpenEXR reader for reference pictures.
 
+use crate::image_file::check_pixels;
 use exr::io::Tracking;
 use exr::prelude::*;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
+use zerkalo_scene::disk::open_regular;
 
 /// Picture from an OpenEXR file.
 pub struct ReadPicture {
@@ -16,13 +17,9 @@ pub struct ReadPicture {
     pub replicates: Option<[Vec<[f64; 3]>; 2]>,
 }
 
-/// Largest number of pixels of a file that is read: 8192 x 8192.
-const MAX_PIXELS: usize = 1 << 26;
-
 /// Reads the headers of an OpenEXR file.
 pub(super) fn read_exr_meta(path: &Path) -> Result<MetaData> {
-    // The type of the reader is that of `from_file`, so that its functions are not compiled twice.
-    MetaData::read_from_buffered(Tracking::new(BufReader::new(File::open(path)?)), false)
+    MetaData::read_from_buffered(Tracking::new(BufReader::new(open_regular(path)?)), false)
 }
 
 /// Reads the channels `R G B` of an OpenEXR file, and `A.R ..` and `B.R ..` of the replicates if
@@ -30,16 +27,14 @@ pub(super) fn read_exr_meta(path: &Path) -> Result<MetaData> {
 pub fn read_exr(path: &Path) -> std::result::Result<ReadPicture, String> {
     let meta = read_exr_meta(path).map_err(|e| e.to_string())?;
     let largest = meta.headers.iter().map(|h| h.layer_size.area()).max().unwrap_or(0);
-    if largest > MAX_PIXELS {
-        return Err(format!("it has {largest} pixels; expected at most {MAX_PIXELS}"));
-    }
+    check_pixels(largest as u64)?;
     let image = read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
         .first_valid_layer()
         .all_attributes()
-        .from_file(path)
+        .from_buffered(BufReader::new(open_regular(path).map_err(|e| e.to_string())?))
         .map_err(|e| e.to_string())?;
     let layer = &image.layer_data;
     let size = [layer.size.width(), layer.size.height()];

@@ -14,3 +14,13 @@ pub use metadata::FileMetadata;
 pub use output::{Bands, Depth, ImageOutput};
 pub use png_reader::read_png;
 pub use png_writer::png_of_rgb;
+
+/// Largest number of pixels of a file that is read: 8192 x 8192.
+const MAX_PIXELS: u64 = 1 << 26;
+
+fn check_pixels(count: u64) -> Result<(), String> {
+    if count > MAX_PIXELS {
+        return Err(format!("it has {count} pixels; expected at most {MAX_PIXELS}"));
+    }
+    Ok(())
+}

@@ -1,13 +1,11 @@
 //! PNG reader, for the dashboard's display of finished pictures.
 
+use crate::image_file::check_pixels;
 use image::codecs::png::PngDecoder;
 use image::{DynamicImage, ImageDecoder, Limits, RgbImage};
 use std::io::BufReader;
 use std::path::Path;
 use zerkalo_scene::disk::open_regular;
-
-/// Largest number of pixels of a file that is read: 8192 x 8192.
-const MAX_PIXELS: u64 = 1 << 26;
 
 /// Reads a PNG file as 8-bit sRGB. Transparency is ignored.
 pub fn read_png(path: &Path) -> Result<RgbImage, String> {
@@ -15,10 +13,7 @@ pub fn read_png(path: &Path) -> Result<RgbImage, String> {
     let decoder = PngDecoder::with_limits(BufReader::new(file), Limits::default());
     let decoder = decoder.map_err(|error| error.to_string())?;
     let (width, height) = decoder.dimensions();
-    let count = u64::from(width) * u64::from(height);
-    if count > MAX_PIXELS {
-        return Err(format!("it has {count} pixels; expected at most {MAX_PIXELS}"));
-    }
+    check_pixels(u64::from(width) * u64::from(height))?;
     let image = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;
     Ok(image.into_rgb8())
 }
