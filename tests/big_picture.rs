@@ -5,7 +5,6 @@ use crate::harness::*;
 use std::fs::File;
 use std::io::BufReader;
 use zerkalo_render::film::TILE_PIXELS;
-use zerkalo_world::TracedPacket;
 
 /// Side of the square picture in pixels.
 const SIDE: u32 = 16384;
@@ -26,8 +25,8 @@ fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 
     for replicate in [0, 1] {
         let pixels = COLUMNS.iter().map(|x| (*x, y));
         let mut tracer = tracer.scattered(replicate, pixels);
-        let mut add = |packet: TracedPacket<f64>, radiance: &mut Radiance<Double>| {
-            for (lane, pixel) in packet.pixels.clone().enumerate() {
+        let mut add = |packet: std::ops::Range<usize>, radiance: &mut Radiance<Double>| {
+            for (lane, pixel) in packet.enumerate() {
                 assert!(pixel < TILE_PIXELS);
                 for (group, scale) in world.info.scales.iter().enumerate() {
                     let value = radiance.groups[group];

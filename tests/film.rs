@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::BufReader;
 use zerkalo_render::film::file::FilmFileHeader;
 use zerkalo_render::film::testing::header;
-use zerkalo_render::film::{InvalidSample, TileHandle, lattice_pixels, quantised_8, quantised_16};
+use zerkalo_render::film::{SampleFault, TileHandle, lattice_pixels, quantised_8, quantised_16};
 use zerkalo_render::image_file::{Depth, ImageOutput};
 
 const WIDTH: usize = 37;
@@ -45,10 +45,7 @@ fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: u
             let fixed = [0, 1, 2, 3, 4, 5].map(|i| (values[i] * SCALES[i / 3]).round() as i64);
             tile.add(replicate, pixel, &fixed);
         }
-        None => {
-            let (x, y) = (x as u32, y as u32);
-            tile.bad.record(InvalidSample { index, replicate: replicate as u8, y, x });
-        }
+        None => tile.count_fault(SampleFault::Invalid),
     }
 }
 

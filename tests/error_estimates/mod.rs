@@ -115,7 +115,7 @@ fn closed_form_describes_the_scene() {
     for filter in [Filter::Point, Filter::Box] {
         let truth = truth(filter);
         let rendering = rendered(&closed_form(filter), 7, Precision::Double, 1024);
-        assert_eq!(rendering.film.bad_samples().count, 0);
+        assert_eq!(rendering.film.bad_samples(), 0);
         let got = picture(&rendering, Replicates::Both);
         let worst = got
             .iter()
@@ -158,7 +158,7 @@ struct Outcome {
 
 fn outcome(rendering: &RenderState, truth: &[[f64; 3]]) -> Outcome {
     let (film, display) = (&rendering.film, Display::default());
-    assert_eq!(film.bad_samples().count, 0);
+    assert_eq!(film.bad_samples(), 0);
     let got = picture(rendering, Replicates::Both);
     let noise = film.noise(&rendering.weights, &display).expect("equal counts");
     let estimator = Estimator::new(film.scales(), &rendering.weights, &display);

@@ -14,7 +14,7 @@ fn scene(text: &str, bounces: u32) -> Scene {
 /// standard error of the mean.
 fn moments(scene: &Scene, precision: Precision) -> [f64; 3] {
     let rendering = rendered(scene, 11, precision, SAMPLES);
-    assert_eq!(rendering.film.bad_samples().count, 0);
+    assert_eq!(rendering.film.bad_samples(), 0);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
     let n = a.len() as f64;
     let mean = a.iter().zip(&b).map(|(a, b)| 0.5 * (a[0] + b[0])).sum::<f64>() / n;

@@ -39,7 +39,7 @@ impl Pair {
         let (display, pool) = (Display::default(), pool(2));
         let [single, double] = self.pictures.each_mut().map(|rendering| -> Vec<f64> {
             uniform(rendering, self.samples, samples - self.samples, &pool);
-            assert_eq!(rendering.film.bad_samples().count, 0);
+            assert_eq!(rendering.film.bad_samples(), 0);
             picture(rendering, Replicates::Both).iter().flat_map(|p| display.levels(*p)).collect()
         });
         self.samples = samples;

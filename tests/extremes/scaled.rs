@@ -38,7 +38,7 @@ fn rms_difference(a: &Scene, b: &Scene, precision: Precision, left_out: usize) -
     let display = Display::default();
     let levels_of_picture = |scene: &Scene| -> Vec<[f64; 3]> {
         let rendering = rendered(scene, 5, precision, SAMPLES);
-        assert_eq!(rendering.film.bad_samples().count, 0);
+        assert_eq!(rendering.film.bad_samples(), 0);
         picture(&rendering, Replicates::Both).iter().map(|p| display.levels(*p)).collect()
     };
     let (a, b) = (levels_of_picture(a), levels_of_picture(b));

@@ -10,7 +10,7 @@ fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<
     let mut scene = sized(scene.clone(), [100, 70]);
     scene.trace.acceleration = acceleration;
     let rendering = rendered(&scene, 1, precision, 8);
-    assert_eq!(rendering.film.bad_samples().count, 0);
+    assert_eq!(rendering.film.bad_samples(), 0);
     rendering.film.bytes()
 }
 

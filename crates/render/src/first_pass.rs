@@ -2,7 +2,7 @@
 //! lattice of pixels to all pixels.
 
 use crate::film::{Film, TILE, TILE_PIXELS, Tile, TileHandle, lattice_pixels};
-use crate::pass::{PassContext, RejectedSamples, TileRenderer};
+use crate::pass::{PassContext, TileRenderer};
 use crate::wave::{JobReport, Wave, WaveReport};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
@@ -120,25 +120,16 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
         pixels: &[StripPixel],
         counts: &mut [Counts],
     ) {
-        let mut rejected = RejectedSamples::new(0);
         tracer.radiance_shared::<1>(0, |packet, radiance| {
-            self.reject_invalid(radiance, &mut rejected, |lane| packet.sample(lane));
-            let packet_pixels = &pixels[packet.pixels.clone()];
+            let packet_pixels = &pixels[packet];
+            self.replace_faults(radiance, |lane, fault| {
+                if let Some(pixel) = packet_pixels.get(lane) {
+                    tiles[pixel.tile].1.count_fault(fault);
+                }
+            });
             self.sum_by_pixel::<1, _>(radiance, packet_pixels, |p, group, sums| {
                 tiles[p.tile].1.add_group(0, p.pixel, group, sums);
             });
-            let tile_of =
-                |x, y| packet_pixels.iter().find(|p| p.position == (x, y)).map(|p| p.tile);
-            for bad in rejected.bad.drain(..) {
-                if let Some(tile) = tile_of(bad.x, bad.y) {
-                    tiles[tile].1.bad.record(bad);
-                }
-            }
-            for saturated in rejected.saturated.drain(..) {
-                if let Some(tile) = tile_of(saturated.x, saturated.y) {
-                    tiles[tile].1.saturated_samples += 1;
-                }
-            }
         });
         // The rays of shared packets are divided in proportion to the pixels of each tile, because
         // the cost must not depend on the packet width. Only packets of a single tile report random

@@ -1,7 +1,7 @@
 //! Pass: traces the jobs of one wave and adds their samples to the film. The pass returns when all
 //! jobs are done or cancelled.
 
-use crate::film::{Estimator, Film, InvalidSample, TILE, TILE_PIXELS, Tile, TileHandle};
+use crate::film::{Estimator, Film, SampleFault, TILE, TILE_PIXELS, Tile, TileHandle};
 use crate::wave::{Job, JobReport, Wave, WaveReport};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -115,28 +115,25 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         };
         // The tile's sums are loaded into the cache while the first samples are traced.
         tile.prefetch(replicate);
-        let mut rejected = RejectedSamples::new(replicate);
         let (mut index, end) = (job.first, job.first + job.count);
         while index < end {
             let count = samples_per_packet(index, end, L::WIDTH);
             match count {
                 _ if count == L::WIDTH => tracer.radiance(index, |packet, radiance| {
-                    self.reject_invalid(radiance, &mut rejected, |lane| packet.sample(lane));
-                    let pixel = usize::from(pixels[packet.pixels.start]);
+                    self.replace_faults(radiance, |_, fault| tile.count_fault(fault));
+                    let pixel = usize::from(pixels[packet.start]);
                     self.sum(radiance, |group, sums| {
                         tile.add_group(replicate, pixel, group, sums);
                     });
                 }),
-                1 => self.trace_shared::<1>(tile, &mut tracer, &mut rejected, pixels, index),
-                2 => self.trace_shared::<2>(tile, &mut tracer, &mut rejected, pixels, index),
-                4 => self.trace_shared::<4>(tile, &mut tracer, &mut rejected, pixels, index),
-                8 => self.trace_shared::<8>(tile, &mut tracer, &mut rejected, pixels, index),
+                1 => self.trace_shared::<1>(tile, &mut tracer, replicate, pixels, index),
+                2 => self.trace_shared::<2>(tile, &mut tracer, replicate, pixels, index),
+                4 => self.trace_shared::<4>(tile, &mut tracer, replicate, pixels, index),
+                8 => self.trace_shared::<8>(tile, &mut tracer, replicate, pixels, index),
                 _ => unreachable!("packets are narrower than 32"),
             }
             index += count as u32;
         }
-        rejected.bad.into_iter().for_each(|bad| tile.bad.record(bad));
-        tile.saturated_samples += rejected.saturated.len() as u64;
         tile.advance(replicate, job.count);
         tracer.counts()
     }
@@ -147,14 +144,13 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         &self,
         tile: &mut Tile,
         tracer: &mut TileTracer<L>,
-        rejected: &mut RejectedSamples,
+        replicate: usize,
         pixels: &[u8],
         first: u32,
     ) {
-        let replicate = rejected.replicate;
         tracer.radiance_shared::<COUNT>(first, |packet, radiance| {
-            self.reject_invalid(radiance, rejected, |lane| packet.sample(lane));
-            let pixels = &pixels[packet.pixels.clone()];
+            self.replace_faults(radiance, |_, fault| tile.count_fault(fault));
+            let pixels = &pixels[packet];
             self.sum_by_pixel::<COUNT, _>(radiance, pixels, |pixel, group, sums| {
                 tile.add_group(replicate, usize::from(*pixel), group, sums);
             });
@@ -190,14 +186,13 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Replaces the samples that the film cannot hold, and records them in `rejected`. Valid
-    /// samples cost only a comparison. `sample_of` returns pixel and sample index of a lane.
+    /// Replaces the samples that the film cannot hold. Calls `count(lane, fault)` for each fault.
+    /// Valid samples cost only a comparison.
     #[inline(always)]
-    pub(super) fn reject_invalid(
+    pub(super) fn replace_faults(
         &self,
         radiance: &mut Radiance<L>,
-        rejected: &mut RejectedSamples,
-        sample_of: impl Fn(usize) -> ((u32, u32), u32),
+        count: impl FnMut(usize, SampleFault),
     ) {
         let mut valid = L::mask(true);
         for (group, limit) in self.limits.iter().enumerate().take(self.scales.len()) {
@@ -209,19 +204,18 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
                 & (v.z.ge(zero) & v.z.le(limit));
         }
         if !valid.all() {
-            self.replace_invalid(radiance, rejected, sample_of);
+            self.replace_found_faults(radiance, count);
         }
     }
 
-    /// Implements [`Self::reject_invalid`] for a packet with an invalid sample. A light group in
+    /// Implements [`Self::replace_faults`] for a packet with a fault. A light group in
     /// which a channel is NaN or negative becomes black. A channel above the limit, even an
     /// infinite one, is reduced to the limit.
     #[cold]
-    fn replace_invalid(
+    fn replace_found_faults(
         &self,
         radiance: &mut Radiance<L>,
-        rejected: &mut RejectedSamples,
-        sample_of: impl Fn(usize) -> ((u32, u32), u32),
+        mut count: impl FnMut(usize, SampleFault),
     ) {
         let (mut bad, mut saturated) = (L::mask(false), L::mask(false));
         for (group, limit) in radiance.groups.iter_mut().zip(self.limits).take(self.scales.len()) {
@@ -231,27 +225,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
             saturated = saturated | (valid & v.max_element().gt(limit));
             *group = Vec3::new(v.x.min(limit), v.y.min(limit), v.z.min(limit)).masked(valid);
         }
-        for lane in (0..L::WIDTH).filter(|lane| (bad | saturated).lane(*lane)) {
-            let ((x, y), index) = sample_of(lane);
-            let sample = InvalidSample { index, replicate: rejected.replicate as u8, y, x };
-            rejected.bad.extend(bad.lane(lane).then_some(sample));
-            rejected.saturated.extend(saturated.lane(lane).then_some(sample));
+        for (lanes, fault) in [(bad, SampleFault::Invalid), (saturated, SampleFault::Saturated)] {
+            (0..L::WIDTH).filter(|lane| lanes.lane(*lane)).for_each(|lane| count(lane, fault));
         }
-    }
-}
-
-/// Samples of one job that the film cannot hold.
-pub(super) struct RejectedSamples {
-    replicate: usize,
-    /// Samples that are NaN or negative in a light group.
-    pub(super) bad: Vec<InvalidSample>,
-    /// Samples that exceed the film's limit in a light group.
-    pub(super) saturated: Vec<InvalidSample>,
-}
-
-impl RejectedSamples {
-    pub(super) fn new(replicate: usize) -> Self {
-        Self { replicate, bad: Vec::new(), saturated: Vec::new() }
     }
 }
 
@@ -321,25 +297,25 @@ mod tests {
             let (scales, precision) = (world.info.scales.clone(), "single".to_string());
             let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
             let tile = film.slots(&[0]).remove(0).prepare();
-            let mut rejected = RejectedSamples::new(0);
+            let mut faults = Vec::new();
             let mut radiance = Radiance::<Single>::black();
             radiance.groups[0].x =
                 Single::from_fn(|i| Float::from_f64(if i == 3 { value } else { 0.5 }));
             radiance.groups[1].y = Single::from_f64(0.25);
-            renderer.reject_invalid(&mut radiance, &mut rejected, |lane| ((lane as u32, 0), 0));
+            renderer.replace_faults(&mut radiance, |lane, fault| faults.push((lane, fault)));
             let pixels = [0, 1, 2, 3, 4, 5, 6, 7];
             renderer.sum_by_pixel::<1, _>(&radiance, &pixels, |pixel, group, sums| {
                 tile.add_group(0, *pixel, group, sums);
             });
-            let sample = [InvalidSample { index: 0, replicate: 0, y: 0, x: 3 }];
-            let recorded =
-                if stored == 0.0 { (&sample[..], &[][..]) } else { (&[][..], &sample[..]) };
-            assert_eq!((&rejected.bad[..], &rejected.saturated[..]), recorded, "{value}");
-            rejected.bad.into_iter().for_each(|bad| tile.bad.record(bad));
-            tile.saturated_samples += rejected.saturated.len() as u64;
+            let fault = match stored {
+                0.0 => SampleFault::Invalid,
+                _ => SampleFault::Saturated,
+            };
+            assert_eq!(faults, [(3, fault)], "{value}");
+            tile.count_fault(fault);
             tile.advance(0, 1);
             let only = |group| crate::film::testing::only(group, 2);
-            assert_eq!(film.bad_samples().count + film.saturated_samples(), 1);
+            assert_eq!(film.bad_samples() + film.saturated_samples(), 1);
             assert_eq!(film.pixel(3, 0, &only(0)), [stored, 0.0, 0.0], "{value}");
             assert_eq!(film.pixel(4, 0, &only(0)), [0.5, 0.0, 0.0], "{value}");
             assert_eq!(film.pixel(3, 0, &only(1)), [0.0, 0.25, 0.0], "{value}");

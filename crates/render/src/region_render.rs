@@ -189,7 +189,7 @@ impl RegionRender {
             noise: schedule.noise,
             eta_seconds: share.filter(|_| done > 0.0).map(|_| Interval::exact(left)),
             progress: Some(done),
-            bad_samples: finished.bad_samples + film.bad_samples().count,
+            bad_samples: finished.bad_samples + film.bad_samples(),
             saturated_samples: finished.saturated_samples + film.saturated_samples(),
             saturated_pixels: finished.saturated_pixels + film.saturated_pixels(),
             ..finished.clone()

@@ -1,6 +1,6 @@
 //! Block of pixels: values that are the same for all samples of a pixel, computed once per tile.
-//! They are the pixel's coordinates, the key of its random numbers, and the vector from the eye to
-//! its upper left corner.
+//! They are the key of the pixel's random numbers, and the vector from the eye to its upper left
+//! corner.
 
 use std::ops::Range;
 use zerkalo_kernel::lanes::{Float, SimdFloat, SimdU32, Vec3};
@@ -14,8 +14,6 @@ pub const MAX_BLOCK_PIXELS: usize = 256;
 /// last pixel.
 pub(super) struct PixelBlock<S> {
     count: usize,
-    x: [u32; MAX_BLOCK_PIXELS],
-    y: [u32; MAX_BLOCK_PIXELS],
     /// See [`Sampler::key`].
     keys: [u32; MAX_BLOCK_PIXELS],
     /// Vectors from the eye to the pixels' upper left corners on the plane at unit distance: all x,
@@ -31,24 +29,23 @@ impl<S: Float> PixelBlock<S> {
         replicate: usize,
         mut pixels: impl Iterator<Item = (u32, u32)>,
     ) -> Self {
+        let (mut xs, mut ys) = ([0; MAX_BLOCK_PIXELS], [0; MAX_BLOCK_PIXELS]);
         let mut out = Self {
             count: 0,
-            x: [0; MAX_BLOCK_PIXELS],
-            y: [0; MAX_BLOCK_PIXELS],
             keys: [0; MAX_BLOCK_PIXELS],
             corner_directions: [[S::default(); MAX_BLOCK_PIXELS]; 3],
         };
-        for ((x, y), pixel) in out.x.iter_mut().zip(&mut out.y).zip(pixels.by_ref()) {
+        for ((x, y), pixel) in xs.iter_mut().zip(&mut ys).zip(pixels.by_ref()) {
             (*x, *y) = pixel;
             out.count += 1;
         }
         debug_assert!(pixels.next().is_none(), "more than {MAX_BLOCK_PIXELS} pixels");
         let Some(last) = out.count.checked_sub(1) else { return out };
         let padded = out.count.next_multiple_of(L::WIDTH);
-        let (x, y) = (out.x[last], out.y[last]);
-        out.x[last..padded].fill(x);
-        out.y[last..padded].fill(y);
-        let pixels = || out.x[..padded].iter().copied().zip(out.y[..padded].iter().copied());
+        let (x, y) = (xs[last], ys[last]);
+        xs[last..padded].fill(x);
+        ys[last..padded].fill(y);
+        let pixels = || xs[..padded].iter().copied().zip(ys[..padded].iter().copied());
         for (key, pixel) in out.keys.iter_mut().zip(pixels()) {
             *key = sampler.key(pixel, replicate);
         }
@@ -62,11 +59,6 @@ impl<S: Float> PixelBlock<S> {
     /// Returns the number of pixels.
     pub fn len(&self) -> usize {
         self.count
-    }
-
-    /// Returns the column and the row of pixel `i`.
-    pub fn pixel(&self, i: usize) -> (u32, u32) {
-        (self.x[i], self.y[i])
     }
 
     /// Returns the key of pixel `i` and the vector to its corner, the same in all lanes.

@@ -67,46 +67,35 @@ pub struct TileTracer<'a, L: SimdFloat> {
 
 impl<L: SimdFloat> TileTracer<'_, L> {
     /// Traces the samples `first..first + WIDTH` of every pixel and passes the radiance of each
-    /// packet to `sink`. A packet holds samples of one pixel. `first` must be a multiple of
-    /// `WIDTH`.
+    /// packet to `sink`, with the range of its pixels in the list of all pixels. A packet holds
+    /// samples of one pixel. `first` must be a multiple of `WIDTH`.
     #[inline(always)]
-    pub fn radiance(
-        &mut self,
-        first: u32,
-        mut sink: impl FnMut(TracedPacket<'_, L::Scalar>, &mut Radiance<L>),
-    ) {
+    pub fn radiance(&mut self, first: u32, mut sink: impl FnMut(Range<usize>, &mut Radiance<L>)) {
         let block = self.sampler.block(first, L::WIDTH);
         for i in 0..self.pixels.len() {
             let (key, corner_direction) = self.pixels.broadcast(i);
             self.trace(corner_direction, &block.for_pixel(key), L::mask(true));
-            let packet = TracedPacket {
-                block: &self.pixels,
-                pixels: i..i + 1,
-                first,
-                samples_per_pixel: L::WIDTH,
-            };
-            sink(packet, &mut self.radiance);
+            sink(i..i + 1, &mut self.radiance);
         }
     }
 
     /// Traces the samples `first..first + COUNT` of every pixel and passes the radiance of each
-    /// packet to `sink`. A packet holds samples of `WIDTH / COUNT` pixels; its pixel `i` occupies
-    /// the `COUNT` lanes from `i * COUNT` on. `COUNT` must be a power of two below `WIDTH`, and
+    /// packet to `sink`, with the range of its pixels in the list of all pixels. A packet holds
+    /// samples of `WIDTH / COUNT` pixels; its pixel `i` occupies the `COUNT` lanes from `i * COUNT`
+    /// on. `COUNT` must be a power of two below `WIDTH`, and
     /// `first` a multiple of `COUNT`.
     #[inline(always)]
     pub fn radiance_shared<const COUNT: usize>(
         &mut self,
         first: u32,
-        mut sink: impl FnMut(TracedPacket<'_, L::Scalar>, &mut Radiance<L>),
+        mut sink: impl FnMut(Range<usize>, &mut Radiance<L>),
     ) {
         let block = self.sampler.block(first, COUNT);
         for pixels in self.pixels.packets(L::WIDTH / COUNT) {
             let (keys, corner_directions) = self.pixels.gather::<L, COUNT>(pixels.start);
             let active = first_lanes::<L>(pixels.len() * COUNT);
             self.trace(corner_directions, &block.for_pixels(keys), active);
-            let packet =
-                TracedPacket { block: &self.pixels, pixels, first, samples_per_pixel: COUNT };
-            sink(packet, &mut self.radiance);
+            sink(pixels, &mut self.radiance);
         }
     }
 
@@ -134,23 +123,6 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         }
         let candidates = self.candidates.as_ref();
         world.trace(&mut path, candidates, sampler, active, &mut self.radiance);
-    }
-}
-
-/// Traced packet: the pixel and the sample index of each of its lanes.
-pub struct TracedPacket<'a, S> {
-    block: &'a PixelBlock<S>,
-    /// Range of the packet's pixels in the list of the tracer's pixels.
-    pub pixels: Range<usize>,
-    first: u32,
-    samples_per_pixel: usize,
-}
-
-impl<S: Float> TracedPacket<'_, S> {
-    /// Returns the pixel (column and row) and the sample index that were traced in a lane.
-    pub fn sample(&self, lane: usize) -> ((u32, u32), u32) {
-        let pixel = self.pixels.start + lane / self.samples_per_pixel;
-        (self.block.pixel(pixel), self.first + (lane % self.samples_per_pixel) as u32)
     }
 }
 

@@ -10,7 +10,6 @@ mod box_filter;
 mod display;
 mod downsample;
 pub mod file;
-mod invalid;
 mod light_weights;
 mod linear_image;
 mod noise;
@@ -26,14 +25,13 @@ mod tile;
 pub use box_filter::box_means;
 pub use display::{Display, Tone, quantised_16};
 pub use downsample::{IncrementalDownsample, Thumbnail};
-pub use invalid::{INVALID_REMEMBERED, InvalidSample, InvalidSamples};
 pub use light_weights::{LightWeights, Replicates, Sums};
 pub use linear_image::LinearImage;
 pub use noise::{Estimator, Mse, Noise, TileNoise};
 pub use pixel_probe::PixelProbe;
 pub use srgb_table::quantised_8;
 pub use store::{Film, Header, TileHandle};
-pub use tile::{MAX_FILM_GROUPS, TILE_PIXELS, Tile, lattice_pixels};
+pub use tile::{MAX_FILM_GROUPS, SampleFault, TILE_PIXELS, Tile, lattice_pixels};
 
 /// Side of a film tile in pixels. The pixels of a tile are stored and sampled together.
 pub const TILE: usize = 16;

@@ -3,7 +3,6 @@
 
 use crate::film::TILE;
 use crate::film::display::Display;
-use crate::film::invalid::InvalidSamples;
 use crate::film::light_weights::{LightWeights, Replicates, Sums};
 use crate::film::noise::{Estimator, Noise};
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
@@ -282,11 +281,9 @@ impl Film {
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
-    /// Returns the invalid samples since the last restart.
-    pub fn bad_samples(&self) -> InvalidSamples {
-        let mut all = InvalidSamples::default();
-        self.touched().for_each(|(_, tile)| all.merge(&tile.bad));
-        all
+    /// Returns the number of invalid samples, see `Tile::bad_samples`.
+    pub fn bad_samples(&self) -> u64 {
+        self.touched().map(|(_, tile)| tile.bad_samples).sum()
     }
 
     /// Returns the number of saturated samples, see `Tile::saturated_samples`.

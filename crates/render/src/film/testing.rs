@@ -82,8 +82,7 @@ pub trait TestFilm {
     ///
     /// - Header: width, height and number of light groups (u32 each), a scale for each group (f64), the
     ///   seed (u64), and the name of the floating-point precision as length in bytes (u32) and text.
-    /// - Invalid samples: their number (u64), the number of stored positions (u32), and for each
-    ///   position index, x, y (u32 each) and replicate (u8).
+    /// - Number of invalid samples (u64).
     /// - Tiles, row by row: sample counts of A and B (u32 each), and [`Tile::lattice_px`] (u8). If
     ///   the tile has samples, the sums of the pixels inside the picture follow,
     ///   `[replicate][row][column][group][channel]` (i64).
@@ -119,15 +118,7 @@ impl TestFilm for Film {
         out.extend(header.seed.to_le_bytes());
         out.extend(u32_bytes(header.precision.len()));
         out.extend(header.precision.as_bytes());
-        let bad = self.bad_samples();
-        out.extend(bad.count.to_le_bytes());
-        out.extend(u32_bytes(bad.first.len()));
-        for sample in &bad.first {
-            for n in [sample.index, sample.x, sample.y] {
-                out.extend(n.to_le_bytes());
-            }
-            out.push(sample.replicate);
-        }
+        out.extend(self.bad_samples().to_le_bytes());
         (0..self.tile_count()).for_each(|index| add_tile(self.tile(index), &mut out));
         match self.saturated_samples() {
             0 => {}

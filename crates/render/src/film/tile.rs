@@ -1,7 +1,6 @@
 //! Film tile of 16x16 pixels: integer sums of the samples of both replicates.
 
 use crate::film::TILE;
-use crate::film::invalid::InvalidSamples;
 use std::collections::TryReserveError;
 use zerkalo_kernel::lanes::prefetch;
 
@@ -38,11 +37,10 @@ pub struct Tile {
     pub lattice_px: usize,
     /// `true` if an integer sum has reached `i64::MAX`.
     pub(super) full: bool,
-    /// Number of samples above the largest value that the film can store, to which they were
-    /// clamped.
+    /// Number of samples with [`SampleFault::Saturated`].
     pub saturated_samples: u64,
-    /// Invalid samples, in whose place black was added.
-    pub bad: InvalidSamples,
+    /// Number of samples with [`SampleFault::Invalid`].
+    pub bad_samples: u64,
     /// Integer sums, `[replicate][pixel][group][channel]`. Until the tile is first written, only the
     /// memory is used.
     pub(super) sums: Vec<i64>,
@@ -50,6 +48,15 @@ pub struct Tile {
     /// 64]` is for pixel p. Sums of other pixels count as zero, so that a restart does not access
     /// them.
     written: [[u64; TILE_PIXELS / 64]; 2],
+}
+
+/// Reason for which the film does not hold a sample as it was traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleFault {
+    /// The sample is NaN or negative in a light group; black was added.
+    Invalid,
+    /// The sample exceeds the largest value that the film can store, which was added.
+    Saturated,
 }
 
 impl Tile {
@@ -103,6 +110,13 @@ impl Tile {
     /// Increases the sample count of all pixels in `replicate` (0: A, 1: B) by `samples`.
     pub fn advance(&mut self, replicate: usize, samples: u32) {
         self.counts[replicate] = self.counts[replicate].saturating_add(samples);
+    }
+
+    pub fn count_fault(&mut self, fault: SampleFault) {
+        match fault {
+            SampleFault::Invalid => self.bad_samples += 1,
+            SampleFault::Saturated => self.saturated_samples += 1,
+        }
     }
 
     /// Records that the pixels whose x and y are multiples of `step_px` (1, 2, 4, 8 or 16) have
@@ -208,7 +222,7 @@ impl Tile {
         for replicate in 0..2 {
             self.advance(replicate, other.counts[replicate]);
         }
-        self.bad.merge(&other.bad);
+        self.bad_samples += other.bad_samples;
     }
 }
 

@@ -310,7 +310,7 @@ impl ActiveRender {
             quality_seconds: QUALITIES
                 .map(|levels| self.schedule.seconds_to_noise(levels, seconds)),
             progress: self.schedule.progress(seconds),
-            bad_samples: self.state.film.bad_samples().count,
+            bad_samples: self.state.film.bad_samples(),
             saturated_samples: self.state.film.saturated_samples(),
             saturated_pixels: self.state.film.saturated_pixels(),
             recent_samples_per_second: self.speed.unwrap_or(0.0),

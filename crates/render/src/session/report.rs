@@ -79,7 +79,7 @@ impl Report {
         Self {
             spp: Spp { min, mean: samples as f64 / pixels as f64, max },
             samples,
-            bad_samples: film.bad_samples().count,
+            bad_samples: film.bad_samples(),
             saturated_samples: film.saturated_samples(),
             saturated_pixels: film.saturated_pixels(),
             ..Self::default()

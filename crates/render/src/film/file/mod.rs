@@ -21,8 +21,6 @@
 //!   record ends here;
 //! - the number of samples above the largest value that the film can store (u64);
 //! - the number of invalid samples (u64);
-//! - the number of invalid samples whose positions are stored (u8), and for each of them its index
-//!   in the sample sequence, x, y (u32 each) and replicate (u8; 0: A, 1: B);
 //! - the integer sums in planes, in the order replicate, group, channel. A plane begins with the
 //!   number of bytes that its largest sum needs (u8, 0 to 8). The sums of the pixels inside the
 //!   picture follow row by row, each with this number of bytes.
@@ -47,7 +45,7 @@ use std::collections::BTreeMap;
 /// First bytes of a film file.
 const MAGIC: [u8; 8] = *b"\x89ZKF\r\n\x1a\n";
 /// Version of the film file format that is written and read.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Number of tiles in a `TILE` chunk, fewer in the last one.
 const TILES_PER_CHUNK: usize = 64;
 /// Largest width and height, in pixels, of a film that is read from a file.

@@ -4,7 +4,7 @@ use super::*;
 use crate::FileError;
 use crate::film::testing::TestFilm;
 use crate::film::testing::{Rng, each_tile, film, white};
-use crate::film::{Film, InvalidSample, TILE, Tone};
+use crate::film::{Film, TILE, Tone};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -28,7 +28,7 @@ fn sample_film() -> Film {
             tile.advance(replicate, count);
         }
         if x0 == 0 {
-            tile.bad.record(InvalidSample { index: 3, replicate: 1, y: y0 as u32, x: 2 });
+            tile.bad_samples += 2;
             tile.saturated_samples += 5;
         }
     });
@@ -131,9 +131,9 @@ fn altered_bytes_are_refused() {
     let error = read(b"\x89PNG\r\n\x1a\n0000").unwrap_err().to_string();
     assert!(error.contains("it is not a film file") && error.contains("--checkpoint"), "{error}");
     let mut newer = bytes.clone();
-    newer[8] = 2;
+    newer[8] = 3;
     let error = read(&newer).unwrap_err().to_string();
-    assert!(error.contains("version 2 of the format, and this program reads 1"), "{error}");
+    assert!(error.contains("version 3 of the format, and this program reads 2"), "{error}");
     let error = read(&[&bytes[..], b"x"].concat()).unwrap_err().to_string();
     assert!(error.contains("1 bytes follow its end"), "{error}");
 }

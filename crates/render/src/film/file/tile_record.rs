@@ -2,7 +2,6 @@
 
 use crate::film::TILE;
 use crate::film::file::decode::Fields;
-use crate::film::invalid::{INVALID_REMEMBERED, InvalidSample, InvalidSamples};
 use crate::film::tile::{TILE_PIXELS, Tile};
 
 /// Largest value of a sample times the scale of its light group.
@@ -18,13 +17,7 @@ pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     };
     tile.counts.iter().for_each(|count| out.extend(count.to_le_bytes()));
     out.extend(tile.saturated_samples.to_le_bytes());
-    let bad = &tile.bad;
-    out.extend(bad.count.to_le_bytes());
-    out.push(bad.first.len() as u8);
-    for sample in &bad.first {
-        [sample.index, sample.x, sample.y].iter().for_each(|n| out.extend(n.to_le_bytes()));
-        out.push(sample.replicate);
-    }
+    out.extend(tile.bad_samples.to_le_bytes());
     for replicate in 0..2 {
         let mut pixels: [&[i64]; TILE_PIXELS] = [&[]; TILE_PIXELS];
         let [width, height] = tile.extent;
@@ -60,10 +53,7 @@ fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
 pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Option<()> {
     tile.counts = [fields.u32()?, fields.u32()?];
     tile.saturated_samples = fields.u64()?;
-    tile.bad = InvalidSamples { count: fields.u64()?, first: invalid_samples(fields)? };
-    if tile.bad.count < tile.bad.first.len() as u64 {
-        return None;
-    }
+    tile.bad_samples = fields.u64()?;
     let extent = tile.extent;
     let pixels = extent[0] * extent[1];
     for (replicate, count) in tile.counts.into_iter().enumerate() {
@@ -98,19 +88,6 @@ pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Opt
         }
     }
     Some(())
-}
-
-fn invalid_samples(fields: &mut Fields) -> Option<Vec<InvalidSample>> {
-    let remembered = usize::from(fields.u8()?);
-    if remembered > INVALID_REMEMBERED {
-        return None;
-    }
-    let sample = |_| {
-        let [index, x, y] = [fields.u32()?, fields.u32()?, fields.u32()?];
-        Some(InvalidSample { index, replicate: fields.u8()?, y, x })
-    };
-    let samples: Vec<_> = (0..remembered).map(sample).collect::<Option<_>>()?;
-    (samples.is_sorted() && samples.iter().all(|s| s.replicate < 2)).then_some(samples)
 }
 
 /// Iterates row by row over the pixels of a tile inside the picture.
