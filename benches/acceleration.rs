@@ -75,7 +75,7 @@ impl Bench {
 /// Returns the nanoseconds per sample of each bench: the shortest time of several interleaved
 /// renders.
 fn times(mut benches: Vec<Bench>) -> Vec<f64> {
-    let samples = benches[0].film.width() * benches[0].film.height() * SAMPLES as usize;
+    let samples = benches[0].film.header.width * benches[0].film.header.height * SAMPLES as usize;
     let mut traces: Vec<_> = benches.iter_mut().map(|b| move || b.trace()).collect();
     let mut runs: Vec<&mut dyn FnMut()> =
         traces.iter_mut().map(|t| t as &mut dyn FnMut()).collect();

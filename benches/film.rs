@@ -48,7 +48,7 @@ fn noise(c: &mut Criterion) {
         let film = film(640, 480, groups);
         for (name, tone) in Tone::NAMED {
             let display = Display { exposure_ev: 0.0, tone };
-            let estimator = Estimator::new(film.scales(), &white(groups), &display);
+            let estimator = Estimator::new(&film.header.scales, &white(groups), &display);
             let mut tile = (0..film.tile_count()).cycle();
             let id = BenchmarkId::new(format!("{groups} groups"), name);
             group.bench_function(id, |b| {
@@ -77,7 +77,7 @@ fn pictures(c: &mut Criterion) {
         let target = ImageOutput::from_path(dir.path().join(name)).expect("a known extension");
         let header = header(&one);
         group.bench_function(name, |b| b.iter(|| target.write(&header, depth, &mut &one)));
-        let bytes = std::fs::metadata(target.path()).map_or(0, |m| m.len());
+        let bytes = std::fs::metadata(&target.path).map_or(0, |m| m.len());
         println!("{name}: {bytes} bytes");
     }
 }

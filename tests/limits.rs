@@ -106,7 +106,7 @@ fn values(scene: &Scene) -> Vec<f64> {
 /// carry. A change of the depth limit therefore changes the rounding, too.
 fn values_and_rounding(scene: &Scene) -> (Vec<f64>, f64) {
     let rendering = rendered(scene, 3, Precision::Single, SAMPLES);
-    let rounding = rendering.film.scales().iter().map(|scale| 0.5 / scale).sum();
+    let rounding = rendering.film.header.scales.iter().map(|scale| 0.5 / scale).sum();
     (picture(&rendering, Replicates::Both).concat(), rounding)
 }
 

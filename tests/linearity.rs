@@ -61,7 +61,7 @@ fn light_weights_replace_retracing() {
         for (what, after) in &changes {
             let mix = LightWeights { weights: rendering.world.info().groups.weights(after) };
             let mut mixed = Vec::new();
-            for y in 0..rendering.film.height() {
+            for y in 0..rendering.film.header.height {
                 mixed.extend(rendering.film.row(y, Replicates::Both, &mix).concat());
             }
             let fresh = values(after, precision);

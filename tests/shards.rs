@@ -131,7 +131,7 @@ fn planned(name: &str, size: Option<[u32; 2]>, seed: u64, target: f64) -> Planne
     let total: u64 = shards.iter().sum();
     let largest = shards.iter().max().copied().unwrap_or(0) as f64;
     let result = Planned {
-        noise: noise(&sum).rmse_levels / target,
+        noise: noise(&sum).rmse.levels / target,
         rays: (pilot_rays + total as f64) / reference,
         pilot: pilot_rays / (pilot_rays + total as f64),
         imbalance: 8.0 * largest / total.max(1) as f64 - 1.0,

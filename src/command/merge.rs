@@ -23,12 +23,12 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
             cost(&report, plan.predicted_levels)
         ))?;
     } else if let Some(noise) = report.noise
-        && noise.rmse_levels > plan.settings.noise_levels
+        && noise.rmse.levels > plan.settings.noise_levels
     {
         print_line(&format!(
             "the noise is {:.1} % above the target of {}: merge to a .zk file, and plan another \
              round by `zerkalo plan --from`",
-            100.0 * (noise.rmse_levels / plan.settings.noise_levels - 1.0),
+            100.0 * (noise.rmse.levels / plan.settings.noise_levels - 1.0),
             plan.settings.noise_levels
         ))?;
     }
@@ -41,7 +41,7 @@ fn cost(report: &Report, predicted_levels: f64) -> String {
     match report.noise {
         Some(noise) => format!(
             "noise {:.3} instead of about {predicted_levels:.3} 8-bit levels",
-            noise.rmse_levels
+            noise.rmse.levels
         ),
         None => "noise unknown, because some tiles have no samples".to_string(),
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_render::export::scene_hash;
-use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::file::{FilmReader, SavedFilm};
 use zerkalo_render::film::{Estimator, Noise};
 use zerkalo_render::plan::{BASE, Part, PartShard, Plan, PlanSettings};
 use zerkalo_render::schedule::{Settings, Stop, USUAL_SLOPE};
@@ -122,11 +122,11 @@ fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let part = part.ok_or_else(|| {
         failed("it belongs to no plan; name a film that `zerkalo merge` has written")
     })?;
-    if !part.is_whole() {
+    if part.missing().is_some() {
         return Err(failed("it lacks shards of its plan; merge all of them first"));
     }
-    let (header, film) = reader.read()?;
-    let estimator = Estimator::new(film.scales(), &header.weights, &header.display);
+    let SavedFilm { header, film } = reader.read()?;
+    let estimator = Estimator::new(&film.header.scales, &header.weights, &header.display);
     let cap = part.plan.settings.rays_per_pixel;
     let schedule_settings = Settings { rays_per_pixel: cap, ..settings(args.noise) };
     let schedule = part.plan.schedule(&film, &estimator, schedule_settings);
@@ -134,7 +134,7 @@ fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     print_line(&format!(
         "{}  noise {:.3} 8-bit levels (the base of the plan)",
         path.display(),
-        schedule.noise.map_or(0.0, |noise: Noise| noise.rmse_levels)
+        schedule.noise.map_or(0.0, |noise: Noise| noise.rmse.levels)
     ))?;
     let settings = PlanSettings {
         noise_levels: args.noise,

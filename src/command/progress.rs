@@ -3,6 +3,7 @@
 use crate::dashboard::text::durations;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
+use zerkalo_render::schedule::Interval;
 use zerkalo_render::session::Report;
 
 /// Seconds of rendering before the first output.
@@ -79,7 +80,7 @@ fn status(report: &Report) -> String {
     let mut text = counts(report);
     text += &format!("  {:.1} Msamples/s", report.samples_per_second() * 1e-6);
     if let Some(noise) = report.noise {
-        text += &format!("  noise {:.2}", noise.rmse_levels);
+        text += &format!("  noise {:.2}", noise.rmse.levels);
     }
     if let Some(left) = report.eta_seconds {
         text += &format!("  {} left", durations(left));
@@ -100,7 +101,7 @@ pub fn counts(report: &Report) -> String {
 /// Formats the noise, such as `noise 0.500 8-bit levels`.
 pub fn noise(report: &Report) -> String {
     match report.noise {
-        Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_levels),
+        Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse.levels),
         None => "noise unknown".to_string(),
     }
 }

@@ -68,7 +68,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         None => as_a_whole(job, checkpoint)?,
     };
     let end = rendered.end;
-    let printed = print_line(&summary(output.path(), size, &rendered.report, end));
+    let printed = print_line(&summary(&output.path, size, &rendered.report, end));
     if let Some(path) = &args.stats {
         let stats = stats::json(args, &hash, size, &rendered, started.elapsed());
         disk::write(path, stats.as_bytes())?;
@@ -169,7 +169,7 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
         (Err(_), Some(status)) => {
             warn(&format!(
                 "stopped by a signal: {} is not written, because regions are missing",
-                output.path().display()
+                output.path.display()
             ));
             Err(Failure::Signalled(status))
         }

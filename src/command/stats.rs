@@ -46,9 +46,9 @@ pub fn json(
         // Seconds from the start of the program until every pixel has a sample.
         "first_picture_seconds": first_picture.map(|s| s + rendered.set_after.as_secs_f64()),
         // Null if the replicates A and B have never had equal numbers of samples.
-        "noise_levels": report.noise.map(|n| n.rmse_levels),
+        "noise_levels": report.noise.map(|n| n.rmse.levels),
         "noise_levels_p95": report.noise.map(|n| n.p95_levels),
-        "rmse_linear": report.noise.map(|n| n.rmse_linear),
+        "rmse_linear": report.noise.map(|n| n.rmse.linear),
         "bad_samples": report.bad_samples,
         "saturated_samples": report.saturated_samples,
         "saturated_pixels": report.saturated_pixels,

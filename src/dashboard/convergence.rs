@@ -45,7 +45,7 @@ impl Convergence {
         }
         self.generation = report.generation;
         self.samples = report.samples;
-        let Some(noise_levels) = report.noise.map(|n| n.rmse_levels).filter(|n| *n > 0.0) else {
+        let Some(noise_levels) = report.noise.map(|n| n.rmse.levels).filter(|n| *n > 0.0) else {
             return;
         };
         let point = Point { seconds: report.seconds, noise_levels };

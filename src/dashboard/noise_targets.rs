@@ -3,6 +3,7 @@
 
 use crate::dashboard::Convergence;
 use crate::dashboard::text::{duration, durations};
+use zerkalo_render::schedule::Interval;
 use zerkalo_render::session::{QUALITIES, Report};
 
 /// Appearance of the picture at each target in [`QUALITIES`].
@@ -22,7 +23,7 @@ pub const ABOUT: &str = "Halving the noise takes two to four times as long. Ente
 /// s more`. The text has no time for a target that the first report had already reached.
 pub fn cost(report: Option<&Report>, convergence: &Convergence, at: usize) -> String {
     let Some(report) = report else { return "not known yet".to_string() };
-    if report.noise.is_some_and(|noise| noise.rmse_levels <= QUALITIES[at]) {
+    if report.noise.is_some_and(|noise| noise.rmse.levels <= QUALITIES[at]) {
         let seconds = convergence.seconds_at(QUALITIES[at]);
         return seconds.map_or("reached".to_string(), |s| format!("reached after {}", duration(s)));
     }

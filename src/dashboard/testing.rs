@@ -1,6 +1,6 @@
 //! Scenes and simulated reports of the renderer for tests.
 
-use zerkalo_render::film::{Mse, Noise};
+use zerkalo_render::film::{ByMeasure, Noise};
 use zerkalo_render::schedule::Spp;
 use zerkalo_render::session::{QUALITIES, Report, State};
 use zerkalo_scene::Scene;
@@ -28,11 +28,9 @@ pub fn report(generation: u64, spp: u64, noise_levels: Option<f64>) -> Report {
         compile_seconds: 1e-4,
         first_picture_seconds: Some(0.02),
         noise: noise_levels.map(|levels| Noise {
-            rmse_linear: levels / 255.0,
-            rmse_levels: levels,
+            rmse: ByMeasure { linear: levels / 255.0, levels },
             p95_levels: 2.0 * levels,
-            worst_levels: 3.0 * levels,
-            effective_pixels: Mse { linear: 1e4, levels: 1e4 },
+            effective_pixels: ByMeasure { linear: 1e4, levels: 1e4 },
         }),
         eta_seconds: None,
         quality_seconds: [None; QUALITIES.len()],

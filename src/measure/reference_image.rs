@@ -90,7 +90,7 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> Squares {
 
 /// Returns the pixels of the picture of `film`, `[row][column]`.
 fn pixels(film: &Film, replicates: Replicates, weights: &LightWeights) -> Vec<[f64; 3]> {
-    (0..film.height()).flat_map(|y| film.row(y, replicates, weights)).collect()
+    (0..film.header.height).flat_map(|y| film.row(y, replicates, weights)).collect()
 }
 
 impl Reference {

@@ -14,7 +14,7 @@ const LONG: [&str; 6] = ["--size", "160x120", "--noise", "0.35", "--threads", "2
 /// samples.
 fn test_film(path: &Path) -> Vec<u8> {
     let read = FilmReader::open(path).and_then(FilmReader::read);
-    read.unwrap_or_else(|error| panic!("{error}")).1.bytes()
+    read.unwrap_or_else(|error| panic!("{error}")).film.bytes()
 }
 
 fn args<'a>(name: &'a str, more: &[&'a str]) -> Vec<&'a str> {
@@ -78,13 +78,13 @@ fn signal_keeps_the_samples_and_another_target_continues_them() {
     signals::signal("TERM", child.id());
     let run = Run::from(child.wait_with_output().unwrap());
     assert_eq!(run.status, 143, "{}", run.err);
-    let before = FilmReader::open(&desk.path("a.zk")).unwrap().read().unwrap().1.samples();
+    let before = FilmReader::open(&desk.path("a.zk")).unwrap().read().unwrap().film.samples();
     assert!(before > 0);
     // The checkpoint already meets the noise target of the resumed render, which must keep the
     // samples of the checkpoint.
     let done = desk.run(&args("200", &["--resume", "a.zk", "--checkpoint", "b.zk"]));
     assert_eq!(done.status, 0, "{}", done.err);
-    let after = FilmReader::open(&desk.path("b.zk")).unwrap().read().unwrap().1.samples();
+    let after = FilmReader::open(&desk.path("b.zk")).unwrap().read().unwrap().film.samples();
     assert!(after >= before, "{before} samples before, {after} after");
 }
 

@@ -80,7 +80,7 @@ fn shards_merged_in_any_order_equal_one_run_of_the_plan() {
         assert!(merge(&desk, &steps, "steps.png") == one[0], "{shards} shards in two steps");
         merge(&desk, &parts, "merged.zk");
         let film = FilmReader::open(&desk.path("merged.zk")).and_then(FilmReader::read);
-        films.push(film.unwrap().1.bytes());
+        films.push(film.unwrap().film.bytes());
     }
     // The number of shards has no influence on the film.
     assert!(films.iter().all(|film| *film == films[0]));

@@ -14,11 +14,11 @@ fn open(desk: &Desk, names: &[&str]) -> Result<FilmFiles, String> {
 }
 
 fn film(desk: &Desk, name: &str) -> Film {
-    FilmReader::open(&desk.path(name)).and_then(FilmReader::read).unwrap().1
+    FilmReader::open(&desk.path(name)).and_then(FilmReader::read).unwrap().film
 }
 
 fn sum(films: &FilmFiles) -> &Film {
-    &films.sum.as_ref().unwrap().1
+    &films.sum.as_ref().unwrap().film
 }
 
 fn rows(films: &FilmFiles) -> Vec<WatchedShards> {
@@ -72,7 +72,7 @@ fn parts_are_added_as_they_appear() {
     let entry = |header: &zerkalo_render::film::file::FilmFileHeader| {
         header.metadata.iter().find(|(key, _)| key == "Shards").cloned()
     };
-    assert_eq!(entry(&films.sum.as_ref().unwrap().0), entry(&merged.header));
+    assert_eq!(entry(&films.sum.as_ref().unwrap().header), entry(&merged.header));
     assert!(entry(&merged.header).unwrap().1.starts_with("0-3 of 3, plan "));
     // The samples of a file that is removed no longer count. The names on the command line may have
     // any order.

@@ -161,8 +161,8 @@ fn outcome(rendering: &RenderState, truth: &[[f64; 3]]) -> Outcome {
     assert_eq!(film.bad_samples(), 0);
     let got = picture(rendering, Replicates::Both);
     let noise = film.noise(&rendering.weights, &display).expect("equal counts");
-    let estimator = Estimator::new(film.scales(), &rendering.weights, &display);
-    let [width, values] = [film.width(), 3 * got.len()];
+    let estimator = Estimator::new(&film.header.scales, &rendering.weights, &display);
+    let [width, values] = [film.header.width, 3 * got.len()];
     let mut tiles = vec![(0.0, 0.0, 0usize); film.tile_count()];
     let (mut linear, mut mean_error) = (0.0, [0.0; 3]);
     for (i, (got, truth)) in got.iter().zip(truth).enumerate() {
@@ -182,8 +182,8 @@ fn outcome(rendering: &RenderState, truth: &[[f64; 3]]) -> Outcome {
     }
     let levels = (levels / values as f64).sqrt();
     Outcome {
-        levels_ratio: levels / noise.rmse_levels,
-        linear_ratio: (linear / values as f64).sqrt() / noise.rmse_linear,
+        levels_ratio: levels / noise.rmse.levels,
+        linear_ratio: (linear / values as f64).sqrt() / noise.rmse.linear,
         levels,
         tiles: tiles.into_iter().map(|(estimate, truth, _)| (estimate, truth)).collect(),
         mean_error,
@@ -303,7 +303,7 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     let reference_spp = 704;
     let stop = spp_stop(reference_spp);
     assert_eq!(follow(&mut reference, settings(true, 0, stop), &pool), StoppedBy::Spp);
-    let own = reference.film.noise(&reference.weights, &display).unwrap().rmse_levels;
+    let own = reference.film.noise(&reference.weights, &display).unwrap().rmse.levels;
     assert!(own < 0.1, "the reference has an error of {own} levels itself");
     let reference = levels(&reference);
 
@@ -333,7 +333,7 @@ fn assert_linear_target_is_met(size: [u32; 2], seeds: u64) {
     let linear = |stop| Settings { criterion: Criterion::Linear, ..settings(true, 0, stop) };
     assert_eq!(follow(&mut reference, linear(stop), &pool), StoppedBy::Spp);
     let noise = reference.film.noise(&reference.weights, &Display::default()).unwrap();
-    let (reference, own) = (values(&reference), noise.rmse_linear);
+    let (reference, own) = (values(&reference), noise.rmse.linear);
     let target = 0.00068;
     assert!(own < 0.3 * target, "the reference has an error of {own} itself");
     let mut squares = Vec::new();

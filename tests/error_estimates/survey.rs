@@ -41,7 +41,7 @@ impl Reference {
         }
         let rendering = rendered(&sample.scene, 987_654, Precision::Auto, count);
         let own =
-            rendering.film.noise(&rendering.weights, &Display::default()).unwrap().rmse_levels;
+            rendering.film.noise(&rendering.weights, &Display::default()).unwrap().rmse.levels;
         Self { levels: levels(&picture(&rendering, Replicates::Both)), own }
     }
 
@@ -115,7 +115,7 @@ fn examine(number: u64, reference_count: u32, seeds: u64, uniform_seeds: usize) 
         let (rendering, schedule, _) = run(&sample, seed, true, stop, |_, _| false);
         let noise = schedule.noise.expect("an estimate");
         truths.push(reference.square(&rendering));
-        reports.push(noise.rmse_levels.powi(2));
+        reports.push(noise.rmse.levels.powi(2));
         rays.push(schedule.rays as f64);
         pixels += noise.effective_pixels.levels;
         used.push(seed);

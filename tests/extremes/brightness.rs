@@ -146,7 +146,7 @@ fn amplifying_mirrors_give_finite_white() {
             // Saturated samples leave the noise estimate finite.
             let noise = rendering.film.noise(&rendering.weights, &Display::default()).unwrap();
             assert!(
-                noise.rmse_levels.is_finite() && noise.rmse_linear.is_finite(),
+                noise.rmse.levels.is_finite() && noise.rmse.linear.is_finite(),
                 "{name}: {noise:?}"
             );
         }

@@ -16,12 +16,12 @@ fn options() -> Options {
 /// reflecting surface in it.
 fn tiles(film: &Film, scene: &Scene) -> Vec<(u32, bool)> {
     let hits = first_hits(scene);
-    let width = film.width();
+    let width = film.header.width;
     (0..film.tile_count())
         .map(|i| {
             let tile = film.tile(i).expect("every tile has samples");
             let [x, y] = [i % film.tile_columns(), i / film.tile_columns()].map(|n| n * TILE);
-            let rows = y..(y + TILE).min(film.height());
+            let rows = y..(y + TILE).min(film.header.height);
             let pixels = rows.flat_map(|y| (x..(x + TILE).min(width)).map(move |x| y * width + x));
             (tile.counts.iter().sum(), pixels.into_iter().any(|p| hits[p].reflects))
         })
@@ -374,7 +374,7 @@ fn a19_checkpoints() {
     let generation = first.set_scene(Arc::clone(&scene));
     let whole = film_of(&mut first, generation, Some(&path));
     let checkpoint = Checkpoint::read(&path).unwrap();
-    let samples = FilmReader::open(&path).unwrap().read().unwrap().1.samples();
+    let samples = FilmReader::open(&path).unwrap().read().unwrap().film.samples();
     let mut second = start();
     let generation = second.continue_from(Arc::clone(&scene), checkpoint);
     let (film, rays) = film_of(&mut second, generation, None);

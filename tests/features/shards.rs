@@ -128,17 +128,17 @@ fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
         let empty = Film::new(film.header.clone());
         write(number, &part_file(&plan, number, false, &empty))?;
         films.poll();
-        ensure(films.sum.as_ref().is_some_and(|(_, film)| film.bytes() == sum.bytes()), || {
+        ensure(films.sum.as_ref().is_some_and(|s| s.film.bytes() == sum.bytes()), || {
             format!("samples of shard {number} before they are traced")
         })?;
         write(number, &whole)?;
         films.poll();
         sum.add(film).map_err(|e| e.to_string())?;
-        ensure(films.sum.as_ref().is_some_and(|(_, film)| film.bytes() == sum.bytes()), || {
+        ensure(films.sum.as_ref().is_some_and(|s| s.film.bytes() == sum.bytes()), || {
             format!("the sum lacks samples of shard {number}")
         })?;
     }
-    let (_, film) = films.sum.as_ref().ok_or("no film")?;
+    let film = &films.sum.as_ref().ok_or("no film")?.film;
     ensure(film.bytes() == one.bytes(), || "another film".to_string())
 }
 
@@ -161,7 +161,7 @@ fn e2_watching() {
     let mut films = FilmFiles::open(&[folder.path().join("job.plan")]).unwrap();
     fs::remove_file(folder.path().join("job-2.zk")).unwrap();
     assert!(
-        films.poll() && films.sum.as_ref().unwrap().1.bytes() != one.bytes(),
+        films.poll() && films.sum.as_ref().unwrap().film.bytes() != one.bytes(),
         "a shard left out"
     );
 }

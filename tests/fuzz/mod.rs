@@ -269,8 +269,8 @@ fn wait(session: &Session) -> bool {
 
 fn film(bytes: &[u8]) -> Option<(FilmFileHeader, Vec<u8>)> {
     let reader = FilmReader::new(Path::new("a.zk"), bytes, bytes.len() as u64);
-    let (header, film) = reader.and_then(FilmReader::read).ok()?;
-    Some((header, film.bytes()))
+    let read = reader.and_then(FilmReader::read).ok()?;
+    Some((read.header, read.film.bytes()))
 }
 
 /// Checks that a mutated checkpoint is refused unless its contents are those of the original.

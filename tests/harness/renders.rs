@@ -179,5 +179,5 @@ pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
 /// Returns the radiance of every pixel, row by row.
 pub fn picture(rendering: &RenderState, replicates: Replicates) -> Vec<[f64; 3]> {
     let RenderState { film, weights, .. } = rendering;
-    (0..film.height()).flat_map(|y| film.row(y, replicates, weights)).collect()
+    (0..film.header.height).flat_map(|y| film.row(y, replicates, weights)).collect()
 }

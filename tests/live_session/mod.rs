@@ -161,14 +161,14 @@ fn noisy_light_change_resumes_finished_session() {
     })
     .report;
     assert!(report.samples > dim.samples, "the target was not met: {:?}", dim.noise);
-    assert!(report.noise.unwrap().rmse_levels <= 0.15);
+    assert!(report.noise.unwrap().rmse.levels <= 0.15);
     // The reported estimate equals the one that the current film gives if it is computed anew.
     let film = session.with(|r, _| r.film.noise(&r.weights, &Display::default())).unwrap().unwrap();
     assert_eq!(report.noise.unwrap(), film);
     // With the original lights the noise is lower again, so that the session stays finished.
     let back = finish(&mut session, &scene()).report;
     assert_eq!(back.samples, report.samples);
-    assert!(back.noise.unwrap().rmse_levels < 0.15);
+    assert!(back.noise.unwrap().rmse.levels < 0.15);
 }
 
 #[test]

@@ -8,14 +8,14 @@ use crate::harness::*;
 fn levels(session: &Session) -> (Vec<[f64; 3]>, f64) {
     let read = |r: &RenderState| {
         let mut all = Vec::new();
-        for y in 0..r.film.height() {
+        for y in 0..r.film.header.height {
             let row = r.film.row(y, Replicates::Both, &r.weights);
             all.extend(row.iter().map(|x| Display::default().levels(*x)));
         }
         all
     };
     let noise =
-        |r: &RenderState| r.film.noise(&r.weights, &Display::default()).unwrap().rmse_levels;
+        |r: &RenderState| r.film.noise(&r.weights, &Display::default()).unwrap().rmse.levels;
     session.with(move |r, _| (read(r), noise(r))).unwrap()
 }
 

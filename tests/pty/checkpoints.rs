@@ -4,7 +4,7 @@ use super::*;
 use crate::harness::*;
 
 fn film(path: PathBuf) -> Film {
-    FilmReader::open(&path).and_then(FilmReader::read).unwrap_or_else(|e| panic!("{e}")).1
+    FilmReader::open(&path).and_then(FilmReader::read).unwrap_or_else(|e| panic!("{e}")).film
 }
 
 /// Waits until the file `name` exists. A checkpoint gets its name only when it is complete.
@@ -143,7 +143,7 @@ fn killed_dashboard_continues_from_its_checkpoint() {
     assert_eq!(status, 0, "{bytes}");
     let files = fs::read_dir(fixture.0.path()).unwrap().map(|e| e.unwrap().file_name());
     let checkpoints = files.filter(|name| name.to_string_lossy().ends_with(".zk"));
-    checkpoints.for_each(|name| assert_eq!(film(fixture.0.path().join(name)).width(), 320));
+    checkpoints.for_each(|name| assert_eq!(film(fixture.0.path().join(name)).header.width, 320));
 }
 
 #[test]

@@ -61,10 +61,10 @@ fn counts(rendering: &RenderState) -> Vec<f64> {
     let film = &rendering.film;
     let tile = |x: usize, y: usize| y / TILE * film.tile_columns() + x / TILE;
     let count_of = |i: usize| {
-        let tile = film.tile(tile(i % film.width(), i / film.width()));
+        let tile = film.tile(tile(i % film.header.width, i / film.header.width));
         tile.map_or(0, |t| t.counts.iter().sum::<u32>())
     };
-    (0..film.width() * film.height()).map(|i| f64::from(count_of(i))).collect()
+    (0..film.header.width * film.header.height).map(|i| f64::from(count_of(i))).collect()
 }
 
 /// Renders a picture until the schedule ends or more than `max_rays` rays are traced.
@@ -86,7 +86,7 @@ fn shot(scene: &Scene, seed: u64, adaptive: bool, stop: Stop, max_rays: u64) -> 
         picture: picture(&rendering, Replicates::Both),
         counts: counts(&rendering),
         rays: schedule.rays as f64,
-        reported: noise.map_or(0.0, |n| n.rmse_levels.powi(2)),
+        reported: noise.map_or(0.0, |n| n.rmse.levels.powi(2)),
         effective_pixels: noise.map_or(0.0, |n| n.effective_pixels.levels),
         ended,
     }

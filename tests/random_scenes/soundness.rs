@@ -36,7 +36,7 @@ fn sound(scene: &Scene) -> Verdict {
             ));
         }
         let noise = rendering.film.noise(&rendering.weights, &Display::default());
-        let values = noise.map(|n| [n.rmse_linear, n.rmse_levels, n.p95_levels, n.worst_levels]);
+        let values = noise.map(|n| [n.rmse.linear, n.rmse.levels, n.p95_levels]);
         if !values.is_some_and(|values| values.iter().all(|x| x.is_finite() && *x >= 0.0)) {
             return Verdict::Different(format!("{precision:?}: a noise of {noise:?}"));
         }

@@ -9,7 +9,7 @@
 use crate::export::{Provenance, film_header};
 use crate::file_error::FileError;
 use crate::film::Film;
-use crate::film::file::{EncodedFilm, Fields, FilmFileHeader, FilmReader, Tag, text};
+use crate::film::file::{EncodedFilm, Fields, FilmFileHeader, FilmReader, SavedFilm, Tag, text};
 use crate::schedule::{Schedule, Settings};
 use crate::session::Report;
 use crate::{Options, RenderState};
@@ -116,7 +116,7 @@ impl Checkpoint {
     /// Reads the checkpoint at `path`. Fails if the file cannot be read, is no checkpoint, or is
     /// damaged.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let (header, film) = FilmReader::open(path)?.read()?;
+        let SavedFilm { header, film } = FilmReader::open(path)?.read()?;
         let inputs = SampleInputs::of(&header).filter(|_| header.chunks.contains_key(&SCHEDULE));
         let Some(inputs) = inputs else {
             let what = "it is a film without the state of a render";

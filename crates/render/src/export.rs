@@ -91,7 +91,7 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let noise = match report.noise {
         Some(n) => format!(
             "{:.4} 8-bit levels, {:.4} in 95% of the tiles, linear RMSE {:.6e}",
-            n.rmse_levels, n.p95_levels, n.rmse_linear
+            n.rmse.levels, n.p95_levels, n.rmse.linear
         ),
         None => "unknown".to_string(),
     };

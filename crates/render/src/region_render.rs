@@ -170,7 +170,7 @@ impl RegionRender {
     ) -> Report {
         let (finished, film) = (&self.report, &state.film);
         let [width, height] = state.scene().film.size;
-        let (first, rows) = (f64::from(self.finished_rows), film.height() as f64);
+        let (first, rows) = (f64::from(self.finished_rows), film.header.height as f64);
         let done = (first + share.unwrap_or(0.0) * rows) / f64::from(height);
         let seconds = finished.seconds + seconds;
         let left = seconds * (1.0 - done) / done;

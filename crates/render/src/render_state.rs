@@ -61,7 +61,7 @@ impl RenderState {
     /// Replaces the film by an empty one for the rows `rows` of the picture, in the same memory. If
     /// there is not enough memory, the state is lost.
     pub(super) fn into_band(self, rows: Range<u32>) -> Result<Self, String> {
-        let size = [self.film.width() as u32, rows.len() as u32];
+        let size = [self.film.header.width as u32, rows.len() as u32];
         let header = Header { height: rows.len(), ..self.film.header.clone() };
         let film = Film::try_new(header, Some(self.film));
         let film = film.map_err(|_| memory_budget::refused(size, self.weights.weights.len()))?;
@@ -151,14 +151,16 @@ impl RenderState {
     }
 
     fn rebuild_estimator(&mut self) {
-        self.estimator = Estimator::new(self.film.scales(), &self.weights, &self.display);
+        self.estimator = Estimator::new(&self.film.header.scales, &self.weights, &self.display);
     }
 
     pub fn schedule(&self, settings: Settings) -> Schedule {
         let film = &self.film;
         let pixels = (0..film.tile_count()).map(|tile| film.tile_pixels(tile) as u32);
         let pixels: Vec<u32> = pixels.collect();
-        Schedule::new(&pixels, settings).with_light_period(self.world.info().light_period)
+        let mut schedule = Schedule::new(&pixels, settings);
+        schedule.light_period = self.world.info().light_period;
+        schedule
     }
 
     /// Traces the jobs of the first pass, see `first_pass::run`. The film of a cancelled pass may

@@ -55,6 +55,6 @@ impl SyncRender {
 
     /// Returns the estimated RMSE in 8-bit levels. Returns `None` before the first estimate.
     pub fn noise_levels(&self) -> Option<f64> {
-        self.schedule.noise.map(|noise| noise.rmse_levels)
+        self.schedule.noise.map(|noise| noise.rmse.levels)
     }
 }

@@ -1,6 +1,7 @@
 //! Waves of tracing jobs, and the reports on them.
 
 use crate::film::{TILE_PIXELS, TileNoise};
+use crate::schedule::SAMPLE_ALIGNMENT;
 
 /// Tracing job: the samples `first..first + count` of one replicate, in every pixel of one tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,17 +26,20 @@ pub struct Wave {
 }
 
 impl Wave {
-    /// Shortens each job to at most `longest` samples per pixel. Keeps only the first jobs: as many
-    /// as `pixel_samples` samples over all pixels need, and at least one.
+    /// Shortens each job to at most `longest` samples per pixel, at least [`SAMPLE_ALIGNMENT`]. It
+    /// ends at a multiple of this number, so that the packets of the rest are full. Keeps only the
+    /// first jobs: as many as `pixel_samples` samples over all pixels need, and at least one.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;
         while jobs < self.jobs.len() && (jobs == 0 || sum < pixel_samples) {
-            sum += u64::from(self.jobs[jobs].count.min(longest)) * TILE_PIXELS as u64;
+            let job = &mut self.jobs[jobs];
+            let end = job.first.saturating_add(longest) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT;
+            job.count = job.count.min(end - job.first);
+            sum += u64::from(job.count) * TILE_PIXELS as u64;
             jobs += 1;
         }
         self.jobs.truncate(jobs);
-        self.jobs.iter_mut().for_each(|job| job.count = job.count.min(longest));
         self
     }
 }
@@ -63,7 +67,7 @@ mod tests {
         let jobs: Vec<Job> = (0..4).map(|tile| Job { tile, first: 8, count: 24 }).collect();
         let wave = Wave { replicate: 1, jobs, estimate: true };
         assert_eq!(wave.clone().cut(u64::MAX, 24), wave);
-        let one = wave.clone().cut(0, 8);
+        let one = wave.clone().cut(0, 16);
         assert_eq!(one.jobs, [Job { tile: 0, first: 8, count: 8 }]);
         assert_eq!((one.replicate, one.estimate), (1, true));
         let counts = |samples, longest| -> Vec<u32> {
@@ -71,6 +75,6 @@ mod tests {
         };
         assert_eq!(counts(256 * 48, 24), [24, 24]);
         assert_eq!(counts(256 * 48 + 1, 24), [24, 24, 24]);
-        assert_eq!(counts(256 * 48, 16), [16, 16, 16]);
+        assert_eq!(counts(256 * 16, 16), [8, 8]);
     }
 }

@@ -10,7 +10,7 @@ use crate::dashboard::view::theme::Theme;
 use crate::dashboard::view::watch;
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
-use zerkalo_render::schedule::StoppedBy;
+use zerkalo_render::schedule::{Interval, StoppedBy};
 use zerkalo_render::session::{Report, State};
 
 /// Part of the status line, shown or omitted as a whole.
@@ -76,7 +76,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         parts.push(part(4, vec![plain(number(speed)), dim(" Ms/s")]));
     }
     if let Some(noise) = report.noise {
-        parts.push(part(2, noise_part(model, report, noise.rmse_levels, theme)));
+        parts.push(part(2, noise_part(model, report, noise.rmse.levels, theme)));
     }
     match model.stop.seconds {
         _ if watching => {}

@@ -1,6 +1,6 @@
 //! Display transform of radiance to pixel values: exposure, tone curve, sRGB encoding.
 
-use crate::film::srgb_table::SrgbTable;
+use crate::film::srgb_table::SRGB_TABLE;
 use zerkalo_scene::value::srgb_from_linear;
 
 /// Tone curve from radiance to linear light of a display, as a fraction of its white.
@@ -45,7 +45,7 @@ impl Display {
     /// Returns a closure that rounds [`Display::levels`] to 8 bits. A lookup table and precomputed
     /// constants make it several times faster.
     pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
-        let (tone, factor, curve) = (self.tone, self.exposure_factor(), SrgbTable::shared());
+        let (tone, factor, curve) = (self.tone, self.exposure_factor(), &*SRGB_TABLE);
         move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.level_8(c))
     }
 

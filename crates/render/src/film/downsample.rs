@@ -89,7 +89,7 @@ struct TilePart {
 impl IncrementalDownsample {
     /// Creates the cache for `cols` x `rows` cells over an empty film of the size of `film`.
     pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
-        let size = [film.width(), film.height()];
+        let size = [film.header.width, film.header.height];
         let spans = |pixels: usize, cells: usize| {
             let coverage = coverage(pixels, cells);
             (0..pixels.div_ceil(TILE)).map(|t| Span::new(t * TILE, pixels, &coverage)).collect()
@@ -110,7 +110,7 @@ impl IncrementalDownsample {
     pub fn is_for(&self, film: &Film, cols: usize, rows: usize) -> bool {
         let Layout { size, groups, .. } = self.layout;
         [self.layout.cols, self.layout.rows] == [cols, rows]
-            && size == [film.width(), film.height()]
+            && size == [film.header.width, film.header.height]
             && groups == film.groups()
     }
 
@@ -192,7 +192,7 @@ impl TilePart {
         let cell = 1 + 3 * layout.groups;
         let width = across.len * cell;
         self.sums.resize(down.len * width, 0.0);
-        let per_unit: Vec<f64> = film.scales().iter().flat_map(|s| [1.0 / s; 3]).collect();
+        let per_unit: Vec<f64> = film.header.scales.iter().flat_map(|s| [1.0 / s; 3]).collect();
         let mut line = vec![0.0; width];
         // In the first pass, only the pixels of the lattice have a sample.
         let step = if tile.counts == [0; 2] { tile.lattice_px } else { 1 };
@@ -272,7 +272,7 @@ mod tests {
     /// Returns the mean of each cell of the downsampled picture, computed for comparison from the
     /// overlap of every pixel with every cell.
     fn brute_force(film: &Film, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f64; 3]> {
-        let (width, height) = (film.width(), film.height());
+        let (width, height) = (film.header.width, film.header.height);
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let values: Vec<[f64; 3]> = pixels.map(|(x, y)| film.pixel(x, y, mix)).collect();
         // Pixels that overlap a cell, each with the length of the overlap.

@@ -17,8 +17,8 @@ impl LinearImage {
     /// Creates the image of `film` under `weights`. Pixels without samples are filled by the rule
     /// of [`Thumbnail::of_film`](crate::film::Thumbnail::of_film) for cells without samples.
     pub fn of_film(film: &Film, weights: &LightWeights) -> Self {
-        let (width, height) = (film.width(), film.height());
-        let per_unit = weights.radiance_per_step(film.scales());
+        let (width, height) = (film.header.width, film.header.height);
+        let per_unit = weights.radiance_per_step(&film.header.scales);
         let mut pixels = vec![[0.0f32; 3]; width * height];
         let mut known = vec![false; width * height];
         for y in 0..height {

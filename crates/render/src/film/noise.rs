@@ -38,19 +38,19 @@
 use crate::film::TILE;
 use crate::film::display::{Display, Tone, toned};
 use crate::film::light_weights::LightWeights;
-use crate::film::srgb_table::SrgbTable;
+use crate::film::srgb_table::{SRGB_TABLE, SrgbTable};
 use crate::film::tile::Tile;
 
-/// Mean square error over all pixels and channels of a tile or picture.
+/// Number for each measure of the error of a tile or picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Mse {
-    /// Mean square error of linear radiance.
+pub struct ByMeasure {
+    /// Number for the error of linear radiance.
     pub linear: f64,
-    /// Mean square error of the displayed picture, in squared 8-bit levels.
+    /// Number for the error of the displayed picture, in 8-bit levels.
     pub levels: f64,
 }
 
-impl Mse {
+impl ByMeasure {
     /// Value of [`TileNoise::squares`] for tests: practically infinitely many effective pixels.
     #[cfg(test)]
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
@@ -68,13 +68,14 @@ impl Mse {
 /// Estimated error of one tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileNoise {
-    /// Validation estimate, from the white pixels of the checkerboard.
-    pub reported: Mse,
-    /// Allocation estimate, from the black pixels of the checkerboard.
-    pub allocation: Mse,
+    /// Validation estimate of the mean square error over pixels and channels, from the white pixels
+    /// of the checkerboard.
+    pub reported: ByMeasure,
+    /// Allocation estimate of the same, from the black pixels of the checkerboard.
+    pub allocation: ByMeasure,
     /// Sum of e^2 over the pixels, where e is the squared error of a pixel, summed over its
     /// channels.
-    pub squares: Mse,
+    pub squares: ByMeasure,
     /// Number of pixels of the tile that are inside the picture.
     pub pixels: u32,
     /// Number of samples per pixel in a replicate: the mean of A and B.
@@ -97,7 +98,7 @@ impl Estimator {
             per_unit: weights.radiance_per_step(scales),
             exposure: display.exposure_factor(),
             tone: display.tone,
-            curve: SrgbTable::shared(),
+            curve: &SRGB_TABLE,
         }
     }
 
@@ -128,7 +129,7 @@ impl Estimator {
         let (per_sum_a, per_sum_b) = (per_sum(n), per_sum(m));
         let (share_a, spread) = (n / (n + m), (n * m).sqrt() / (n + m));
         let [width, height] = tile.extent;
-        let (mut halves, mut squares) = ([Mse::default(); 2], Mse::default());
+        let (mut halves, mut squares) = ([ByMeasure::default(); 2], ByMeasure::default());
         for y in 0..height {
             for x in 0..width {
                 let pixel = y * TILE + x;
@@ -153,13 +154,13 @@ impl Estimator {
                     let (to_a, to_b) = (a[c] - mean[c], b[c] - mean[c]);
                     levels += 0.5 * (to_a * to_a + to_b * to_b);
                 }
-                half.add(1.0, Mse { linear, levels });
-                squares.add(1.0, Mse { linear: linear * linear, levels: levels * levels });
+                half.add(1.0, ByMeasure { linear, levels });
+                squares.add(1.0, ByMeasure { linear: linear * linear, levels: levels * levels });
             }
         }
         let pixels = width * height;
         let mean_over =
-            |sums: Mse, pixels: usize| sums.zip(sums, |sum, _| sum / (3 * pixels) as f64);
+            |sums: ByMeasure, pixels: usize| sums.zip(sums, |sum, _| sum / (3 * pixels) as f64);
         // In a tile with a single pixel, both estimates come from this pixel.
         let black = mean_over(halves[0], pixels.div_ceil(2));
         let white = if pixels > 1 { mean_over(halves[1], pixels / 2) } else { black };
@@ -191,7 +192,7 @@ fn weighted(sums: &[i64], per_sum: &[f64]) -> [f64; 3] {
 
 impl TileNoise {
     /// Returns the estimate from all pixels, black and white.
-    pub fn of_all(&self) -> Mse {
+    pub fn of_all(&self) -> ByMeasure {
         let [black, white] = [self.pixels.div_ceil(2), self.pixels / 2].map(f64::from);
         self.allocation.zip(self.reported, |black_mse, white_mse| {
             (black * black_mse + white * white_mse) / (black + white).max(1.0)
@@ -202,35 +203,27 @@ impl TileNoise {
 /// Estimated error of a picture: root mean square errors (RMSE) over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// RMSE in linear radiance.
-    pub rmse_linear: f64,
-    /// RMSE of the displayed picture in 8-bit levels.
-    pub rmse_levels: f64,
+    /// RMSE in linear radiance, and of the displayed picture in 8-bit levels.
+    pub rmse: ByMeasure,
     /// 95th percentile, over the tiles, of the RMSE of a displayed tile, in 8-bit levels.
     pub p95_levels: f64,
-    /// Largest RMSE of a displayed tile, in 8-bit levels.
-    pub worst_levels: f64,
     /// Number of effective pixels (Kish's effective sample size): (sum of e)^2 / (sum of e^2),
     /// where e is the squared error of a pixel. `linear` has the number for radiance, `levels` for
     /// the displayed picture; both are 0 without error.
-    pub effective_pixels: Mse,
+    pub effective_pixels: ByMeasure,
 }
 
 impl Noise {
     /// Returns this estimate with the larger RMSE of the picture, linear and displayed, of the two.
     pub(crate) fn larger(self, other: Self) -> Self {
-        Self {
-            rmse_linear: self.rmse_linear.max(other.rmse_linear),
-            rmse_levels: self.rmse_levels.max(other.rmse_levels),
-            ..self
-        }
+        Self { rmse: self.rmse.zip(other.rmse, f64::max), ..self }
     }
 
     /// Combines the estimates of all tiles. Returns `None` if there are no tiles or an estimate is
     /// missing.
     pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
-        let (mut reported, mut all, mut pixels) = (Mse::default(), Mse::default(), 0.0);
-        let mut squares = Mse::default();
+        let (mut reported, mut all, mut pixels) = (ByMeasure::default(), ByMeasure::default(), 0.0);
+        let mut squares = ByMeasure::default();
         let mut tile_errors = Vec::new();
         let mut samples: Option<u32> = None;
         let mut is_uniform = true;
@@ -248,7 +241,6 @@ impl Noise {
         let rank = (tile_errors.len() * 19).div_ceil(20).checked_sub(1)?;
         let (_, p95, _) = tile_errors.select_nth_unstable_by(rank, f64::total_cmp);
         let p95_levels = p95.sqrt();
-        let worst = tile_errors.iter().copied().fold(0.0, f64::max);
         // `sum` adds means over three channels; `squares` adds squares of sums over channels.
         let effective_pixels = all.zip(squares, |sum, squares| {
             let sum = 3.0 * sum;
@@ -258,12 +250,6 @@ impl Noise {
             let sum = if is_uniform { all } else { white.max(all) };
             (sum / pixels).sqrt()
         });
-        Some(Self {
-            rmse_linear: rmse.linear,
-            rmse_levels: rmse.levels,
-            p95_levels,
-            worst_levels: worst.sqrt(),
-            effective_pixels,
-        })
+        Some(Self { rmse, p95_levels, effective_pixels })
     }
 }

@@ -80,9 +80,9 @@ fn ratios(n: u32, normal: bool, stratified: bool, dark: [f64; 3]) -> Outcome {
             }
         }
         let noise = film.noise(&mix, &display).unwrap();
-        outcome.linear.push(linear.sqrt() / noise.rmse_linear);
-        outcome.levels.push(levels.sqrt() / noise.rmse_levels);
-        let estimator = Estimator::new(film.scales(), &mix, &display);
+        outcome.linear.push(linear.sqrt() / noise.rmse.linear);
+        outcome.levels.push(levels.sqrt() / noise.rmse.levels);
+        let estimator = Estimator::new(&film.header.scales, &mix, &display);
         for (index, tile) in film.touched() {
             tiles[index].push(estimator.tile(tile).unwrap().reported.levels.sqrt());
         }
@@ -147,7 +147,7 @@ fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
         let picture = 0.5 * (a + b);
         let slope = (curve(picture + 1e-7) - curve((picture - 1e-7).max(0.0))) / 2e-7;
         sum[0] += (curve(picture) - curve(0.7 * chance)).powi(2);
-        sum[1] += film.noise(&white(1), &display).unwrap().rmse_levels.powi(2);
+        sum[1] += film.noise(&white(1), &display).unwrap().rmse.levels.powi(2);
         sum[2] += (0.5 * (curve(a) - curve(b))).powi(2);
         sum[3] += (0.5 * (a - b) * slope).powi(2);
     }
@@ -162,7 +162,8 @@ fn estimate_of_one_pixel_matches_the_formula() {
     fill(&mut film, 2, |_, _, r| vec![[0.25, 0.5][r], 1.0, 0.5, 0.0, 0.0, [2.0, 0.0][r]]);
     let mix = LightWeights { weights: vec![[1.0; 3], [0.0, 0.0, 0.25]] };
     let display = Display { exposure_ev: 1.0, tone: Tone::Clip };
-    let tile = Estimator::new(film.scales(), &mix, &display).tile(film.tile(0).unwrap()).unwrap();
+    let tile =
+        Estimator::new(&film.header.scales, &mix, &display).tile(film.tile(0).unwrap()).unwrap();
     // A and B differ in red (0.125 and 0.25) and, summed over both groups, in blue (0.5 and 0.25).
     // The error is half of each difference.
     let expected = (0.0625f64.powi(2) + 0.125f64.powi(2)) / 3.0;
@@ -178,8 +179,8 @@ fn estimate_of_one_pixel_matches_the_formula() {
     // Far above white the displayed difference is 0, because A and B are both clipped.
     let bright = Display { exposure_ev: 9.0, tone: Tone::Clip };
     let noise = film.noise(&only(0, 2), &bright).unwrap();
-    assert_eq!((noise.rmse_levels, quantised_8(bright.levels([0.125; 3])[0])), (0.0, 255));
-    assert!(noise.rmse_linear > 0.0);
+    assert_eq!((noise.rmse.levels, quantised_8(bright.levels([0.125; 3])[0])), (0.0, 255));
+    assert!(noise.rmse.linear > 0.0);
 }
 
 #[test]
@@ -200,7 +201,7 @@ fn both_tone_curves_are_estimated_as_displayed() {
                 }
             }
         }
-        let estimator = Estimator::new(film.scales(), &white(1), &display);
+        let estimator = Estimator::new(&film.header.scales, &white(1), &display);
         let noise = estimator.tile(film.tile(0).unwrap()).unwrap();
         assert!((noise.reported.levels / mse - 1.0).abs() < 2e-5, "{name}: {noise:?} {mse}");
     }
@@ -213,11 +214,9 @@ fn unequal_counts_have_no_noise() {
     assert_eq!(noise(&film), None);
     fill(&mut film, 3, |_, _, _| vec![1.0; 3]);
     let zero = Noise {
-        rmse_linear: 0.0,
-        rmse_levels: 0.0,
+        rmse: ByMeasure::default(),
         p95_levels: 0.0,
-        worst_levels: 0.0,
-        effective_pixels: Mse::default(),
+        effective_pixels: ByMeasure::default(),
     };
     assert_eq!(noise(&film), Some(zero));
     film.slots(&[1]).remove(0).prepare().advance(0, 1);
@@ -247,7 +246,7 @@ fn replicate_with_fewer_samples_still_has_an_estimate() {
                 tile.advance(replicate, count);
             }
         });
-        let estimator = Estimator::new(film.scales(), &white(1), &display);
+        let estimator = Estimator::new(&film.header.scales, &white(1), &display);
         let tile = film.tile(0).unwrap();
         assert_eq!(estimator.tile(tile), None);
         let noise = estimator.tile_so_far(tile).unwrap();
@@ -267,29 +266,35 @@ fn replicate_with_fewer_samples_still_has_an_estimate() {
 #[test]
 fn noise_combines_the_tiles() {
     let tile = |levels: f64, pixels| {
-        let mse = Mse { linear: 0.01, levels: levels * levels };
-        Some(TileNoise { reported: mse, allocation: mse, squares: Mse::SPREAD, pixels, samples: 4 })
+        let mse = ByMeasure { linear: 0.01, levels: levels * levels };
+        Some(TileNoise {
+            reported: mse,
+            allocation: mse,
+            squares: ByMeasure::SPREAD,
+            pixels,
+            samples: 4,
+        })
     };
     let tiles = (1..=20).map(|i| tile(f64::from(i), 256)).chain([tile(7.0, 0)]);
     let noise = Noise::of_tiles(tiles).unwrap();
-    assert!((noise.rmse_linear - 0.1).abs() < 1e-14);
-    assert!((noise.rmse_levels - 143.5f64.sqrt()).abs() < 1e-12);
-    assert_eq!((noise.p95_levels, noise.worst_levels), (19.0, 20.0));
+    assert!((noise.rmse.linear - 0.1).abs() < 1e-14);
+    assert!((noise.rmse.levels - 143.5f64.sqrt()).abs() < 1e-12);
+    assert_eq!(noise.p95_levels, 19.0);
     // If the tiles have different numbers of samples, the larger of two estimates is reported: that
     // from the white half of the pixels, and that from all pixels. If the numbers are equal, the
     // estimate from all pixels is reported.
     let rmse = |reported: f64, allocation: f64, samples: [u32; 2]| {
-        let mse = |x: f64| Mse { linear: x, levels: x };
+        let mse = |x: f64| ByMeasure { linear: x, levels: x };
         let tile = |samples| {
             Some(TileNoise {
                 reported: mse(reported),
                 allocation: mse(allocation),
-                squares: Mse::SPREAD,
+                squares: ByMeasure::SPREAD,
                 pixels: 256,
                 samples,
             })
         };
-        Noise::of_tiles(samples.map(tile)).unwrap().rmse_levels
+        Noise::of_tiles(samples.map(tile)).unwrap().rmse.levels
     };
     assert_eq!((rmse(4.0, 2.0, [4, 8]), rmse(2.0, 6.0, [4, 8])), (2.0, 2.0));
     assert_eq!((rmse(6.0, 2.0, [8, 8]), rmse(2.0, 6.0, [8, 8])), (2.0, 2.0));

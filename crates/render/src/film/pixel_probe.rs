@@ -32,7 +32,7 @@ impl PixelProbe {
         weights: &LightWeights,
         display: &Display,
     ) -> Option<Self> {
-        if x >= film.width() || y >= film.height() {
+        if x >= film.header.width || y >= film.header.height {
             return None;
         }
         let levels = display.levels([0.0; 3]);
@@ -40,7 +40,7 @@ impl PixelProbe {
         let Some(tile) = film.tile(y / TILE * film.tile_columns() + x / TILE) else {
             return Some(probe);
         };
-        let per_unit = weights.radiance_per_step(film.scales());
+        let per_unit = weights.radiance_per_step(&film.header.scales);
         let sums = tile.sums(y % TILE * TILE + x % TILE);
         probe.samples = sums.counts;
         probe.radiance = sums.mean(Replicates::Both, &per_unit);
@@ -50,7 +50,7 @@ impl PixelProbe {
                 [Replicates::A, Replicates::B].map(|replicates| sums.mean(replicates, &per_unit));
             probe.difference = Some([0, 1, 2].map(|c| 0.5 * (a[c] - b[c]).abs()));
         }
-        let noise = Estimator::new(film.scales(), weights, display).tile_so_far(tile);
+        let noise = Estimator::new(&film.header.scales, weights, display).tile_so_far(tile);
         probe.tile_rmse_levels = noise.map(|noise| noise.of_all().levels.sqrt());
         Some(probe)
     }
@@ -81,7 +81,7 @@ mod tests {
         assert_eq!(full.levels, display.levels([2.0, 4.0, 6.0]));
         assert_eq!(full.difference, Some([1.0, 2.0, 0.0]));
         // The corner tile has 4 x 2 pixels. One of them has an error of 1 in red and 2 in green.
-        let estimator = Estimator::new(film.scales(), &mix, &display);
+        let estimator = Estimator::new(&film.header.scales, &mix, &display);
         let noise = estimator.tile_so_far(film.tile(3).unwrap()).unwrap().of_all();
         assert!((noise.linear - 5.0 / 24.0).abs() < 1e-12, "{noise:?}");
         assert_eq!(full.tile_rmse_levels, Some(noise.levels.sqrt()));

@@ -24,13 +24,9 @@ pub(super) struct SrgbTable {
     chords: [[f64; 2]; ENTRIES],
 }
 
-static CURVE: LazyLock<SrgbTable> = LazyLock::new(SrgbTable::tabulated);
+pub(super) static SRGB_TABLE: LazyLock<SrgbTable> = LazyLock::new(SrgbTable::tabulated);
 
 impl SrgbTable {
-    pub fn shared() -> &'static Self {
-        &CURVE
-    }
-
     fn tabulated() -> Self {
         let mut chords = [[0.0; 2]; ENTRIES];
         chords[0] = [0.0, 255.0 * 12.92];
@@ -81,7 +77,7 @@ mod tests {
             let even = f64::from(i) * 1e-6;
             for linear in [even, even * even * even] {
                 let exact = 255.0 * srgb_from_linear(linear);
-                worst = worst.max((SrgbTable::shared().level(linear) - exact).abs());
+                worst = worst.max((SRGB_TABLE.level(linear) - exact).abs());
             }
         }
         assert!(worst < MAX_ERROR, "{worst}");
@@ -93,7 +89,7 @@ mod tests {
         let exact = |linear| quantised_8(255.0 * srgb_from_linear(linear));
         for i in 0..=200_000 {
             let linear = f64::from(i) * 5e-6;
-            assert_eq!(SrgbTable::shared().level_8(linear), exact(linear), "{linear}");
+            assert_eq!(SRGB_TABLE.level_8(linear), exact(linear), "{linear}");
         }
         // Tests values whose relative distance from a border between two 8-bit values is at most
         // 2e-5.
@@ -101,15 +97,15 @@ mod tests {
             let linear = linear_from_srgb(border);
             for step in -2000..=2000 {
                 let linear = linear * (1.0 + f64::from(step) * 1e-8);
-                assert_eq!(SrgbTable::shared().level_8(linear), exact(linear), "{linear}");
+                assert_eq!(SRGB_TABLE.level_8(linear), exact(linear), "{linear}");
             }
         }
     }
 
     #[test]
     fn table_is_exact_at_both_ends() {
-        assert_eq!(SrgbTable::shared().level(0.0), 0.0);
-        assert!((SrgbTable::shared().level(1.0) - 255.0).abs() < 1e-12);
-        assert_eq!(SrgbTable::shared().level(f64::MIN_POSITIVE), 255.0 * 12.92 * f64::MIN_POSITIVE);
+        assert_eq!(SRGB_TABLE.level(0.0), 0.0);
+        assert!((SRGB_TABLE.level(1.0) - 255.0).abs() < 1e-12);
+        assert_eq!(SRGB_TABLE.level(f64::MIN_POSITIVE), 255.0 * 12.92 * f64::MIN_POSITIVE);
     }
 }

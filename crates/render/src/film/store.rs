@@ -98,7 +98,11 @@ impl Film {
                 tile.sums = old.sums;
             }
         }
-        film.reserve()?;
+        // The tiles of a small film are allocated when they are first written, so that the first
+        // picture appears sooner.
+        if Self::memory_bytes(film.header.size(), film.groups()) >= RESERVED_FROM {
+            film.tiles.iter_mut().try_for_each(Tile::reserve)?;
+        }
         Ok(film)
     }
 
@@ -107,15 +111,6 @@ impl Film {
     pub fn memory_bytes(size: [u32; 2], groups: usize) -> u64 {
         let [columns, rows] = size.map(|n| u64::from(n).div_ceil(TILE as u64));
         columns * rows * (Tile::sums_len(groups) * size_of::<i64>()) as u64
-    }
-
-    /// Allocates the tiles of a large film. The tiles of a small film are allocated when they are
-    /// first written, so that the first picture appears sooner.
-    fn reserve(&mut self) -> Result<(), TryReserveError> {
-        if Self::memory_bytes(self.header.size(), self.groups()) < RESERVED_FROM {
-            return Ok(());
-        }
-        self.tiles.iter_mut().try_for_each(Tile::reserve)
     }
 
     /// Creates a film whose tiles have no memory for sums yet.
@@ -152,24 +147,9 @@ impl Film {
         Self { first_row, ..self }
     }
 
-    /// Returns the width of the film in pixels.
-    pub fn width(&self) -> usize {
-        self.header.width
-    }
-
-    /// Returns the height of the film in pixels.
-    pub fn height(&self) -> usize {
-        self.header.height
-    }
-
     /// Returns the number of light groups.
     pub fn groups(&self) -> usize {
         self.header.scales.len()
-    }
-
-    /// Returns the scale of each light group, see [`Header::scales`].
-    pub fn scales(&self) -> &[f64] {
-        &self.header.scales
     }
 
     /// Discards all samples.
@@ -255,8 +235,8 @@ impl Film {
     /// Returns the radiance of the pixels in row `y`: the mean over the samples in `replicates`,
     /// black without samples.
     pub fn row(&self, y: usize, replicates: Replicates, weights: &LightWeights) -> Vec<[f64; 3]> {
-        let mut row = vec![[0.0; 3]; self.width()];
-        let per_unit = weights.radiance_per_step(self.scales());
+        let mut row = vec![[0.0; 3]; self.header.width];
+        let per_unit = weights.radiance_per_step(&self.header.scales);
         self.visit_row(y, |x, sums| row[x] = sums.mean(replicates, &per_unit));
         row
     }
@@ -276,7 +256,7 @@ impl Film {
     /// Returns the estimated error of the picture. `None` if a tile has no samples, or unequal
     /// numbers of samples in A and B.
     pub fn noise(&self, weights: &LightWeights, display: &Display) -> Option<Noise> {
-        let estimator = Estimator::new(self.scales(), weights, display);
+        let estimator = Estimator::new(&self.header.scales, weights, display);
         let noise_of_tile = |index| self.tile(index).and_then(|tile| estimator.tile(tile));
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }

@@ -44,7 +44,7 @@ pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
 /// pixel's samples in radiance, `[group][channel]`. Each sum is multiplied by the scale of its
 /// group and rounded.
 pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usize) -> Vec<f64>) {
-    let scales = film.scales().to_vec();
+    let scales = film.header.scales.to_vec();
     each_tile(film, |tile, [x0, y0]| {
         let [width, height] = tile.extent;
         for replicate in 0..2 {

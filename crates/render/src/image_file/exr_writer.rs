@@ -189,9 +189,9 @@ fn encode_rows(
 ) -> io::Result<()> {
     for y in rows {
         let film = bands.film_with_row(y)?;
-        let mixed = &picture.weights.radiance_per_step(film.scales());
+        let mixed = &picture.weights.radiance_per_step(&film.header.scales);
         let start = bytes.first().map_or(0, Vec::len);
-        bytes.iter_mut().for_each(|bytes| bytes.resize(start + film.width() * 4, 0));
+        bytes.iter_mut().for_each(|bytes| bytes.resize(start + film.header.width * 4, 0));
         film.visit_row(y - film.first_row, |x, sums| {
             let means = [Replicates::Both, Replicates::A, Replicates::B]
                 .map(|replicates| sums.mean(replicates, mixed));

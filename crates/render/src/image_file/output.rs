@@ -4,7 +4,7 @@ use crate::film::Film;
 use crate::film::file::FilmFileHeader;
 use crate::image_file::{exr_writer, png_writer};
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use zerkalo_scene::disk::{Existing, Replacement, WriteError, replace_file};
 
 /// Number of bits per channel of a PNG file.
@@ -52,10 +52,11 @@ static FORMATS: [Format; 2] = [
 /// Path of a picture file to be written, with a known extension.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImageOutput {
-    path: PathBuf,
+    pub path: PathBuf,
     /// Index in [`FORMATS`].
     format: usize,
-    existing: Existing,
+    /// Decides if an existing file is replaced, both when the write begins and when it ends.
+    pub existing: Existing,
 }
 
 impl ImageOutput {
@@ -74,17 +75,6 @@ impl ImageOutput {
         let known = FORMATS.iter().map(|format| format!(".{}", format.extension));
         let remedy = format!("known extensions: {}", known.collect::<Vec<_>>().join(", "));
         Err(WriteError::new(&path, ErrorKind::InvalidFilename, what, &remedy))
-    }
-
-    /// Returns an output that never replaces an existing file, neither when the write begins nor
-    /// when it ends.
-    pub fn create_new(self) -> Self {
-        Self { existing: Existing::Refuse, ..self }
-    }
-
-    /// Returns the path of the picture file.
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Checks, before a long render, that the file can be written.
@@ -139,11 +129,12 @@ mod tests {
     use crate::film::testing::{fill, film, header};
     use crate::image_file::FileMetadata;
     use std::fs;
+    use std::path::Path;
 
     #[test]
     fn extension_chooses_the_format() {
         for good in ["a.png", "A.PNG", "dir.x/b.Exr"] {
-            assert_eq!(ImageOutput::from_path(good).unwrap().path(), Path::new(good));
+            assert_eq!(ImageOutput::from_path(good).unwrap().path, Path::new(good));
         }
         let error = ImageOutput::from_path("out.jpeg").unwrap_err().to_string();
         assert_eq!(
@@ -175,10 +166,11 @@ mod tests {
     }
 
     #[test]
-    fn create_new_overwrites_no_file() {
+    fn refusing_output_overwrites_no_file() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
-        let target = ImageOutput::from_path(&path).unwrap().create_new();
+        let mut target = ImageOutput::from_path(&path).unwrap();
+        target.existing = Existing::Refuse;
         let film = film(40, 20, &[1.0]);
         let write = |noise: &str| target.write(&picture(noise), Depth::Eight, &mut &film);
         write("new").unwrap();
@@ -207,7 +199,7 @@ mod tests {
         }
 
         fn final_metadata(&self) -> Option<Vec<(String, String)>> {
-            assert_eq!(self.rows, self.film.height());
+            assert_eq!(self.rows, self.film.header.height);
             Some(entries("0.5 8-bit levels"))
         }
     }

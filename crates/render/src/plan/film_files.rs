@@ -3,13 +3,11 @@
 
 use crate::checkpoint::seconds_of;
 use crate::film::Film;
-use crate::film::file::{FilmFileHeader, FilmReader};
+use crate::film::file::{FilmFileHeader, FilmReader, SavedFilm};
 use crate::memory_budget;
-use crate::plan::merge::{join, without_plan};
+use crate::plan::merge::{SourcePart, join, without_plan};
 use crate::plan::part::{Part, PartShard, ranges};
 use crate::plan::{BASE, Plan, is_plan_file};
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
@@ -24,14 +22,21 @@ const LATE: Duration = Duration::from_secs(180);
 #[derive(Debug, Default)]
 pub struct FilmFiles {
     files: Vec<FilmFile>,
-    /// Plan file that the user named; it is joined like a film that holds no shard.
-    named: Option<(PathBuf, Part)>,
+    named: Option<NamedPlan>,
     /// Plan that all files share. `None` before the first file, and for a checkpoint without a
     /// plan.
     pub plan: Option<Arc<Plan>>,
     /// Sum of the films, with a header that has the plan and all shards. `None` if no file can be
     /// read.
-    pub sum: Option<(FilmFileHeader, Film)>,
+    pub sum: Option<SavedFilm>,
+}
+
+/// Plan file that the user named.
+#[derive(Debug)]
+struct NamedPlan {
+    path: PathBuf,
+    /// Part without shards, which is joined to the parts of the files.
+    part: Part,
 }
 
 /// Film file that another process may replace at any time.
@@ -133,10 +138,10 @@ impl FilmFiles {
             FilmFile::new(path.with_file_name(format!("{stem}-{shard}.zk")), Some(shard))
         }));
         let part = Part { plan: Arc::new(plan), shards: Vec::new(), rays: 0 };
-        match self.named.replace((path.to_path_buf(), part)) {
+        match self.named.replace(NamedPlan { path: path.to_path_buf(), part }) {
             None => Ok(()),
-            Some((other, _)) => {
-                let [one, two] = [other.display(), path.display()];
+            Some(other) => {
+                let [one, two] = [other.path.display(), path.display()];
                 Err(format!("{one} and {two} are two plans; name one of them"))
             }
         }
@@ -171,8 +176,8 @@ impl FilmFiles {
     /// Returns the share, 0..=1, of the plan's samples that the films hold. `None` without a film
     /// or a plan.
     pub fn progress(&self) -> Option<f64> {
-        let ((_, film), plan) = (self.sum.as_ref()?, self.plan.as_ref()?);
-        let pixels = (film.width() * film.height()) as f64;
+        let (film, plan) = (&self.sum.as_ref()?.film, self.plan.as_ref()?);
+        let pixels = (film.header.width * film.header.height) as f64;
         Some(film.samples() as f64 / (plan.spp() * pixels).max(1.0))
     }
 
@@ -262,11 +267,12 @@ impl FilmFiles {
     /// Checks that all usable films can be added, and stores their common plan.
     fn try_join(&mut self) -> Result<(), String> {
         let is_alone = self.files.len() + usize::from(self.named.is_some()) == 1;
-        let named = self.named.iter_mut().map(|(path, part)| (&**path, part));
-        let mut parts: Vec<(&Path, &mut Part)> = named.collect();
+        let named = self.named.iter_mut();
+        let mut parts: Vec<_> =
+            named.map(|plan| SourcePart { path: &plan.path, part: &mut plan.part }).collect();
         for file in &mut self.files {
             match &mut file.contents {
-                Contents::Part(part) => parts.push((&file.path, part)),
+                Contents::Part(part) => parts.push(SourcePart { path: &file.path, part }),
                 Contents::Checkpoint(_) if !is_alone => return Err(without_plan(&file.path)),
                 Contents::Checkpoint(_) | Contents::Missing | Contents::Refused(_) => {}
             }
@@ -277,55 +283,30 @@ impl FilmFiles {
         Ok(())
     }
 
+    /// Computes the sum of all films that can be added, and refuses the others.
     fn add(&mut self) {
-        while let Err((i, reason)) = self.try_add() {
-            self.files[i].contents = Contents::Refused(reason);
-        }
+        while self.try_add().is_err() {}
     }
 
-    /// Computes the sum of all usable films. Fails if a file cannot be added, with its index and
-    /// the reason.
-    pub(super) fn try_add(&mut self) -> Result<(), (usize, String)> {
+    /// Computes the sum of all usable films. Refuses the first file that cannot be added, and fails
+    /// with the reason.
+    pub(super) fn try_add(&mut self) -> Result<(), String> {
         self.sum = None;
-        let mut order: Vec<(u32, usize)> = Vec::new();
-        for (i, file) in self.files.iter().enumerate() {
-            order.extend(file.first_shard().map(|shard| (shard, i)));
+        let mut order: Vec<_> =
+            self.files.iter_mut().filter(|file| file.first_shard().is_some()).collect();
+        order.sort_by_key(|file| file.first_shard());
+        let mut sum: Option<SavedFilm> = None;
+        for file in order {
+            if let Err(reason) = file.add_to(&mut sum) {
+                file.contents = Contents::Refused(reason.clone());
+                return Err(reason);
+            }
         }
-        order.sort_unstable();
-        let Some((_, first)) = order.first() else { return Ok(()) };
-        let mut header = self.open_film(*first)?.header;
-        let mut film = empty(&header).map_err(|reason| (*first, reason))?;
-        for (_, i) in order {
-            self.add_file(i, &mut film)?;
+        if let (Some(sum), Some(part)) = (&mut sum, self.part()) {
+            part.record(&mut sum.header);
         }
-        if let Some(part) = self.part() {
-            part.record(&mut header);
-        }
-        self.sum = Some((header, film));
+        self.sum = sum;
         Ok(())
-    }
-
-    /// Adds the film of file `i` to `film`. Fails if its number of samples does not fit its shards.
-    fn add_file(&mut self, i: usize, film: &mut Film) -> Result<(), (usize, String)> {
-        let before = film.samples();
-        self.open_film(i)?.add_to(film).map_err(|error| (i, error.to_string()))?;
-        let file = &mut self.files[i];
-        file.samples = film.samples() - before;
-        if let (Contents::Part(part), None) = (&file.contents, file.total) {
-            let samples = |shard: &PartShard| part.plan.samples(shard.number);
-            file.total = Some(part.shards.iter().map(samples).sum());
-        }
-        let (samples, expected) = (file.samples, file.total.unwrap_or(file.samples));
-        if samples > expected || file.is_complete() && samples != expected {
-            let path = file.path.display();
-            let what = format!("its {samples} samples are not the {expected} of its shards");
-            return Err((i, format!("cannot use {path}: {what}; trace it again")));
-        }
-        Ok(())
-    }
-
-    fn open_film(&self, i: usize) -> Result<FilmReader<BufReader<File>>, (usize, String)> {
-        FilmReader::open(&self.files[i].path).map_err(|error| (i, error.to_string()))
     }
 
     /// Returns the common plan with all shards that the files hold. `None` without such a shard.
@@ -338,11 +319,12 @@ impl FilmFiles {
 }
 
 /// Creates an empty film for `header`. Fails if there is not enough memory.
-fn empty(header: &FilmFileHeader) -> Result<Film, String> {
-    let film = &header.film;
-    let (size, groups) = (film.size(), film.scales.len());
+fn empty(header: &FilmFileHeader) -> Result<SavedFilm, String> {
+    let (size, groups) = (header.film.size(), header.film.scales.len());
     memory_budget::check(size, groups, 0)?;
-    Film::try_new(film.clone(), None).map_err(|_| memory_budget::refused(size, groups))
+    let film = Film::try_new(header.film.clone(), None);
+    let film = film.map_err(|_| memory_budget::refused(size, groups))?;
+    Ok(SavedFilm { header: header.clone(), film })
 }
 
 impl Contents {
@@ -373,6 +355,30 @@ impl FilmFile {
             Contents::Checkpoint(_) => Some(BASE),
             Contents::Missing | Contents::Refused(_) => None,
         }
+    }
+
+    /// Adds the film of this file to `sum`, or to an empty film with the header of this file if there
+    /// is no sum yet. Fails if its number of samples does not fit its shards.
+    fn add_to(&mut self, sum: &mut Option<SavedFilm>) -> Result<(), String> {
+        let reader = FilmReader::open(&self.path).map_err(|error| error.to_string())?;
+        let SavedFilm { film, .. } = match sum {
+            Some(sum) => sum,
+            None => sum.insert(empty(&reader.header)?),
+        };
+        let before = film.samples();
+        reader.add_to(film).map_err(|error| error.to_string())?;
+        self.samples = film.samples() - before;
+        if let (Contents::Part(part), None) = (&self.contents, self.total) {
+            let samples = |shard: &PartShard| part.plan.samples(shard.number);
+            self.total = Some(part.shards.iter().map(samples).sum());
+        }
+        let (samples, expected) = (self.samples, self.total.unwrap_or(self.samples));
+        if samples > expected || self.is_complete() && samples != expected {
+            let path = self.path.display();
+            let what = format!("its {samples} samples are not the {expected} of its shards");
+            return Err(format!("cannot use {path}: {what}; trace it again"));
+        }
+        Ok(())
     }
 
     fn is_complete(&self) -> bool {

@@ -1,7 +1,7 @@
 //! Merging: adds the films of the parts of a plan. No shard may be in two of the files.
 
 use crate::film::Film;
-use crate::film::file::FilmFileHeader;
+use crate::film::file::{FilmFileHeader, SavedFilm};
 use crate::plan::part::{Part, PartShard, ranges};
 use crate::plan::{BASE, FilmFiles, Plan};
 use std::collections::HashMap;
@@ -26,8 +26,8 @@ impl Merged {
         if !partial {
             check_complete(&films, &part)?;
         }
-        films.try_add().map_err(|(_, reason)| reason)?;
-        let (header, film) = films.sum.ok_or("there is nothing to merge")?;
+        films.try_add()?;
+        let SavedFilm { header, film } = films.sum.ok_or("there is nothing to merge")?;
         if part.shards.iter().all(|shard| shard.complete)
             && let Some(tile) = part.plan.differing_tile(&film, &part.numbers(|_| true))
         {
@@ -75,17 +75,23 @@ fn check_complete(films: &FilmFiles, part: &Part) -> Result<(), String> {
     ))
 }
 
-/// Checks that films can be added, and returns their common plan. `parts` has the path and the part
-/// of each film. One film may be the merged film from which the common plan started; its part
-/// becomes a part of the common plan that holds only the shard [`BASE`].
+/// Part with the path of the file that holds it.
+pub(super) struct SourcePart<'a> {
+    pub path: &'a Path,
+    pub part: &'a mut Part,
+}
+
+/// Checks that the films of `parts` can be added, and returns their common plan. One film may be
+/// the merged film from which the common plan started; its part becomes a part of the common plan
+/// that holds only the shard [`BASE`].
 ///
 /// # Errors
 /// Fails if there is no part, if the parts belong to different plans, if two of them hold the same
 /// shard, or if the merged film lacks shards of its own plan.
-pub(super) fn join(parts: &mut [(&Path, &mut Part)]) -> Result<Arc<Plan>, String> {
+pub(super) fn join(parts: &mut [SourcePart]) -> Result<Arc<Plan>, String> {
     let plan = common_plan(parts)?;
     let mut holders: HashMap<u32, &Path> = HashMap::new();
-    for (path, part) in parts.iter() {
+    for SourcePart { path, part } in parts.iter() {
         for shard in &part.shards {
             if let Some(other) = holders.insert(shard.number, path) {
                 return Err(format!(
@@ -101,25 +107,25 @@ pub(super) fn join(parts: &mut [(&Path, &mut Part)]) -> Result<Arc<Plan>, String
 }
 
 /// Finds the common plan of `parts` for [`join`], and converts the part of the plan's base.
-fn common_plan(parts: &mut [(&Path, &mut Part)]) -> Result<Arc<Plan>, String> {
-    let latest = parts.iter().map(|(_, part)| &part.plan).find(|latest| {
+fn common_plan(parts: &mut [SourcePart]) -> Result<Arc<Plan>, String> {
+    let latest = parts.iter().map(|source| &source.part.plan).find(|latest| {
         let is_base = |plan: &Plan| latest.settings.base_plan == Some(plan.checksum());
-        parts.iter().all(|(_, part)| part.plan == **latest || is_base(&part.plan))
+        parts.iter().all(|SourcePart { part, .. }| part.plan == **latest || is_base(&part.plan))
     });
     let Some(plan) = latest.cloned() else {
-        let Some((a, first)) = parts.first() else { return Err("no parts are named".to_string()) };
-        let other = parts.iter().find(|(_, part)| part.plan != first.plan);
-        let (b, other) = other.unwrap_or(&parts[0]);
+        let Some(first) = parts.first() else { return Err("no parts are named".to_string()) };
+        let plan = &first.part.plan;
+        let other = parts.iter().find(|other| other.part.plan != *plan).unwrap_or(first);
         return Err(format!(
             "{} and {} belong to different plans ({}); name parts of one plan",
-            a.display(),
-            b.display(),
-            first.plan.difference(&other.plan)
+            first.path.display(),
+            other.path.display(),
+            plan.difference(&other.part.plan)
         ));
     };
-    for (path, part) in parts.iter_mut() {
+    for SourcePart { path, part } in parts.iter_mut() {
         if part.plan != plan {
-            if !part.is_whole() {
+            if part.missing().is_some() {
                 return Err(format!(
                     "cannot use {}: it is the base of a plan and lacks shards; merge it \
                      completely first",

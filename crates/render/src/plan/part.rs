@@ -86,12 +86,6 @@ impl Part {
         (!shards.is_empty()).then_some(Self { plan: Arc::new(plan), shards, rays })
     }
 
-    /// Returns `true` if the film holds all samples of its plan.
-    pub fn is_whole(&self) -> bool {
-        let numbers = self.shards.iter().map(|shard| shard.number);
-        numbers.eq(BASE..=self.plan.settings.shards) && self.shards.iter().all(|s| s.complete)
-    }
-
     /// Returns the numbers of the shards that are `wanted`.
     pub(super) fn numbers(&self, wanted: impl Fn(&PartShard) -> bool) -> Vec<u32> {
         self.shards.iter().filter(|shard| wanted(shard)).map(|shard| shard.number).collect()

@@ -5,7 +5,6 @@ use crate::schedule::{Interval, SAMPLE_ALIGNMENT, Spp};
 use crate::session::{Report, State};
 use crate::wave::{Job, Wave};
 use crate::{RenderState, threads};
-use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -27,7 +26,7 @@ pub struct ShardRender {
     pub state: RenderState,
     pool: rayon::ThreadPool,
     /// Jobs that remain to be traced, in both replicates.
-    remaining: VecDeque<Job>,
+    remaining: Vec<Job>,
     /// Numbers of samples of the complete shard and in the film, over all pixels and replicates.
     samples: [u64; 2],
     pub rays: u64,
@@ -47,7 +46,7 @@ impl ShardRender {
         threads: usize,
     ) -> Result<Self, String> {
         let pool = threads::pool(threads).map_err(|error| error.to_string())?;
-        let mut remaining = VecDeque::new();
+        let mut remaining = Vec::new();
         let mut samples = [0; 2];
         for (tile, range) in ranges.iter().enumerate() {
             let counts = state.film.counts(tile);
@@ -61,7 +60,7 @@ impl ShardRender {
             samples[1] += 2 * u64::from(done) * pixels;
             if done < total {
                 let job = Job { tile: tile as u32, first: range.start + done, count: total - done };
-                remaining.push_back(job);
+                remaining.push(job);
             }
         }
         Ok(Self { state, pool, remaining, samples, rays, measured: (0, 0.0) })
@@ -78,39 +77,28 @@ impl ShardRender {
         let longest = (0.5 * JOB_SECONDS * speed / threads / TILE_PIXELS as f64) as u32;
         let longest =
             longest.min(LONGEST_JOB).next_multiple_of(SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT);
-        let mut jobs: Vec<Job> = Vec::new();
-        let (mut sum, mut cut) = (0.0, Vec::new());
-        while sum < STEP_SECONDS * speed
-            && let Some(job) = self.remaining.pop_front()
-        {
-            // Packets after the cut are full.
-            let end = (job.first + longest) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT;
-            let count = job.count.min(end - job.first);
-            if count < job.count {
-                cut.push(Job { first: end, count: job.count - count, ..job });
-            }
-            jobs.push(Job { count, ..job });
-            sum += 2.0 * f64::from(count) * TILE_PIXELS as f64;
-        }
-        if jobs.is_empty() {
+        let all = Wave { replicate: 0, jobs: self.remaining.clone(), estimate: false };
+        let mut wave = all.cut((0.5 * STEP_SECONDS * speed) as u64, longest);
+        if wave.jobs.is_empty() {
             return false;
         }
         let start = Instant::now();
-        let mut wave = Wave { replicate: 0, jobs, estimate: false };
         let mut traced = 0;
         for replicate in 0..2 {
             wave.replicate = replicate;
             let report = self.state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
             self.rays += report.iter().flatten().map(|report| report.rays).sum::<u64>();
         }
-        for job in &wave.jobs {
+        // The rest of each cut job is traced next, while its tile is still in the cache.
+        for (job, rest) in wave.jobs.iter().zip(&mut self.remaining) {
+            rest.first += job.count;
+            rest.count -= job.count;
             traced += 2 * u64::from(job.count) * self.state.film.tile_pixels(job.tile as usize);
         }
         self.samples[1] += traced;
         self.measured.0 += traced;
         self.measured.1 += start.elapsed().as_secs_f64();
-        // The rest of each cut job is traced next, while its tile is still in the cache.
-        cut.into_iter().rev().for_each(|job| self.remaining.push_front(job));
+        self.remaining.retain(|job| job.count > 0);
         true
     }
 
@@ -126,7 +114,7 @@ impl ShardRender {
         let speed = if seconds > 0.0 { traced as f64 / seconds } else { 0.0 };
         let left = (total - done) as f64 / speed.max(1.0);
         let film = &self.state.film;
-        let pixels = (film.width() * film.height()) as f64;
+        let pixels = (film.header.width * film.header.height) as f64;
         let spp = done as f64 / pixels;
         Report {
             state: State::Tracing,

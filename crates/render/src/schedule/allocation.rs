@@ -15,9 +15,9 @@ use crate::film::TILE_PIXELS;
 use crate::schedule::tile::{FLATTEST, Tile};
 use crate::schedule::{Criterion, MAX_SAMPLES, SAMPLE_ALIGNMENT, Schedule, to_packet};
 use crate::wave::Job;
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
-use zerkalo_scene::value::ascending;
+use zerkalo_scene::value::{ascending, from_total_order, total_order};
 
 /// Rays of an adaptive round, as a share of the rays traced so far: small enough that later
 /// estimates can correct a round, and large enough that threads rarely wait for each other.
@@ -50,32 +50,16 @@ const MIN_CLASS_TILES: f64 = 17.0;
 /// of sqrt(2) between the allocation estimates plus the number between the sample counts.
 const MAX_CLASS_DISTANCE: u32 = 4;
 
-/// Block of samples that a round may give to a tile.
+/// Block of samples that a round may give to a tile. Blocks are ordered by gain, then by fewer
+/// samples, then by the lower number of the tile.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Candidate {
-    /// Gain: expected decrease, per ray, of the sum of the squared errors of all pixels.
-    gain: f64,
+    /// Result of [`total_order`] for the gain: the expected decrease, per ray, of the sum of the
+    /// squared errors of all pixels.
+    gain: i64,
     /// Samples per pixel and replicate that the tile has before the block.
-    pub count: u32,
-    pub tile: usize,
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Candidate {}
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Candidate {
-    /// Orders blocks by gain, then by fewer samples, then by the lower number of the tile.
-    fn cmp(&self, other: &Self) -> Ordering {
-        let fewer = other.count.cmp(&self.count).then(other.tile.cmp(&self.tile));
-        self.gain.total_cmp(&other.gain).then(fewer)
-    }
+    pub count: Reverse<u32>,
+    pub tile: Reverse<usize>,
 }
 
 /// Mean squared error of a tile after n samples per pixel and replicate: `scale * n^(-2 slope)`.
@@ -184,6 +168,7 @@ impl<'a> Allocation<'a> {
         let fall = model.mse(count) - model.mse(count + samples);
         let pixels = f64::from(self.schedule.tiles[tile].pixels);
         let gain = fall * pixels / self.rays(tile, samples.max(1));
+        let (gain, count, tile) = (total_order(gain), Reverse(count), Reverse(tile));
         (samples > 0).then_some(Candidate { gain, count, tile })
     }
 }
@@ -203,14 +188,16 @@ impl Schedule {
 
         let over_picture = |rmse: f64| rmse * rmse * self.pixels() as f64;
         let noise = self.largest_recent_noise();
-        let mut error = over_picture(noise.map_or(0.0, |noise| criterion.of_picture(noise)));
+        let mut error = over_picture(noise.map_or(0.0, |noise| criterion.of(noise.rmse)));
         let target = self.target().filter(|(c, _)| *c == criterion);
         let enough = target.map_or(-1.0, |(_, target)| over_picture(target));
         let mut heap: BinaryHeap<Candidate> =
             expected.iter().enumerate().filter_map(|(i, m)| allocation.candidate(i, m)).collect();
         let min_blocks = MIN_BLOCKS.min(heap.len());
         let mut set_aside = 0.0f64;
-        while let Some(Candidate { gain, count, tile }) = heap.pop() {
+        while let Some(Candidate { gain, count: Reverse(count), tile: Reverse(tile) }) = heap.pop()
+        {
+            let gain = from_total_order(gain);
             let done = (allocation.spent >= budget || gain < WORTHWHILE * set_aside)
                 && allocation.blocks >= min_blocks;
             if done || (error <= enough && allocation.blocks > 0) {

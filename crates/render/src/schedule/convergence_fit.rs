@@ -13,6 +13,30 @@ const POINTS: usize = 7;
 /// doublings at a slope of 0.75 need 4 to 10 % more rays than extrapolated.
 const SPREAD: f64 = 0.15;
 
+/// Interval estimate of a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    pub low: f64,
+    pub high: f64,
+}
+
+impl Interval {
+    /// Creates the interval that holds only `number`.
+    pub fn exact(number: f64) -> Self {
+        Self { low: number, high: number }
+    }
+
+    /// Returns the expected number.
+    pub fn mean(self) -> f64 {
+        0.5 * (self.low + self.high)
+    }
+
+    /// Applies `f`, which must be increasing, to both ends.
+    pub fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        Self { low: f(self.low), high: f(self.high) }
+    }
+}
+
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConvergenceFit {
     /// Numbers of rays with the RMSE of the picture, oldest first.
@@ -38,10 +62,10 @@ impl ConvergenceFit {
         }
     }
 
-    /// Returns an estimate of the total number of rays at which the RMSE falls to `target`. Three slopes are fitted: over the latest two, four and six steps between points.
-    /// The steepest slope gives the lower estimate, the flattest slope the upper one. Before the
-    /// first two steps, [`STEEPEST`] and [`FLATTEST`] are used. Returns `None` before the first
-    /// point.
+    /// Estimates the total number of rays at which the RMSE falls to `target`. Three slopes are
+    /// fitted: over the latest two, four and six steps between points. The steepest slope gives the
+    /// lower end, the flattest slope the upper one. Before the first two steps, [`STEEPEST`] and
+    /// [`FLATTEST`] are used. Returns `None` before the first point.
     pub fn rays_needed(&self, target: f64) -> Option<Interval> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {
@@ -51,14 +75,14 @@ impl ConvergenceFit {
             let (rays0, noise0) = *self.points.get(self.points.len().checked_sub(back + 1)?)?;
             Some(clamp_slope((noise0 / noise).ln() / (rays / rays0).ln()))
         });
-        let (flat, steep) = slopes
-            .map(|p| (p, p))
-            .reduce(|(low, high), (p, _)| (low.min(p), high.max(p)))
-            .unwrap_or((FLATTEST, STEEPEST));
+        let slopes = slopes
+            .map(Interval::exact)
+            .reduce(|all, p| Interval { low: all.low.min(p.low), high: all.high.max(p.high) });
+        let slopes = slopes.unwrap_or(Interval { low: FLATTEST, high: STEEPEST });
         let additional = |p: f64| rays * ((noise / target).powf(1.0 / p) - 1.0);
         Some(Interval {
-            low: rays + additional(steep) * (1.0 - SPREAD),
-            high: rays + additional(flat) * (1.0 + SPREAD),
+            low: rays + additional(slopes.high) * (1.0 - SPREAD),
+            high: rays + additional(slopes.low) * (1.0 + SPREAD),
         })
     }
 

@@ -23,9 +23,9 @@ mod tile;
 use crate::film::{Noise, TileNoise};
 use crate::wave::{Job, JobReport, Wave};
 use convergence_fit::ConvergenceFit;
+pub use convergence_fit::Interval;
 pub use prediction::{PlannedTile, Prediction, USUAL_SLOPE};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
-pub use stop::Interval;
 use tile::{FLATTEST, Tile, clamp_slope};
 
 /// Samples per pixel and replicate before adaptive sampling and noise estimates start. Estimates
@@ -69,7 +69,7 @@ pub struct Spp {
 }
 
 /// Sample counts and noise estimates of the tiles of a render, and the jobs to trace next.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Schedule {
     /// Settings. A finished render resumes if new stop criteria are not reached.
     pub settings: Settings,
@@ -89,8 +89,12 @@ pub struct Schedule {
     pub noise: Option<Noise>,
     /// Samples per pixel and replicate after the latest uniform round that ended with an estimate.
     estimated_at: u32,
-    /// See [`Schedule::with_light_period`].
-    light_period: u32,
+    /// Light period: the number of samples of a pixel that together trace a shadow ray to each light
+    /// once; see [`WorldInfo::light_period`](zerkalo_world::WorldInfo::light_period).
+    ///
+    /// The error falls steeply at this number of samples. Estimates from fewer samples do not
+    /// predict the error. They are discarded once a tile has an estimate from at least this number.
+    pub light_period: u32,
 }
 
 impl Schedule {
@@ -98,27 +102,11 @@ impl Schedule {
     pub fn new(pixels: &[u32], settings: Settings) -> Self {
         Self {
             settings,
-            tiles: pixels.iter().map(|p| Tile::new(*p)).collect(),
-            round: Vec::new(),
-            estimate: false,
+            tiles: pixels.iter().map(|p| Tile { pixels: *p, ..Tile::default() }).collect(),
             replicate: 1,
-            remaining: Vec::new(),
-            convergence: ConvergenceFit::default(),
-            samples: 0,
-            rays: 0,
-            noise: None,
-            estimated_at: 0,
             light_period: 1,
+            ..Self::default()
         }
-    }
-
-    /// Sets the light period: the number of samples of a pixel that together trace a shadow ray to
-    /// each light once; see [`WorldInfo::light_period`](zerkalo_world::WorldInfo::light_period).
-    ///
-    /// The error falls steeply at this number of samples. Estimates from fewer samples do not
-    /// predict the error. They are discarded once a tile has an estimate from at least this number.
-    pub fn with_light_period(self, light_period: u32) -> Self {
-        Self { light_period, ..self }
     }
 
     /// Returns the next step after `seconds` seconds of rendering. The caller reports the result of
@@ -199,7 +187,7 @@ impl Schedule {
     fn update_noise(&mut self) {
         self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error));
         if let Some(noise) = self.noise {
-            self.convergence.record(self.rays as f64, self.settings.criterion.of_picture(noise));
+            self.convergence.record(self.rays as f64, self.settings.criterion.of(noise.rmse));
         }
     }
 
@@ -210,14 +198,16 @@ impl Schedule {
 
     pub fn spp(&self) -> Spp {
         let counts = || self.tiles.iter().map(|t| 2 * t.done);
-        let (pixels, samples) = self.tiles.iter().fold((0u64, 0u64), |(pixels, samples), t| {
-            (pixels + u64::from(t.pixels), samples + 2 * u64::from(t.done) * u64::from(t.pixels))
-        });
         Spp {
             min: counts().min().unwrap_or(0),
-            mean: samples as f64 / pixels.max(1) as f64,
+            mean: 2.0 * self.done() as f64 / self.pixels().max(1) as f64,
             max: counts().max().unwrap_or(0),
         }
+    }
+
+    /// Returns the number of samples in replicate B, over all pixels.
+    fn done(&self) -> u64 {
+        self.tiles.iter().map(|t| u64::from(t.done) * u64::from(t.pixels)).sum()
     }
 
     fn pixels(&self) -> u64 {
@@ -248,8 +238,7 @@ impl Schedule {
     /// mean number of samples per pixel; `u64::MAX` if none is requested.
     fn samples_left(&self) -> u64 {
         let Some(spp) = self.settings.stop.spp else { return u64::MAX };
-        let done: u64 = self.tiles.iter().map(|t| u64::from(t.done) * u64::from(t.pixels)).sum();
-        (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(done)
+        (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(self.done())
     }
 
     /// Returns the jobs of the next round, and stores in `estimate` if the round ends with noise

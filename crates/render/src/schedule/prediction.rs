@@ -5,6 +5,7 @@ use crate::film::TileNoise;
 use crate::schedule::allocation::{Allocation, Candidate, EXPLORATION};
 use crate::schedule::tile::Tile;
 use crate::schedule::{Schedule, Settings};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// Assumed slope before any tile has doubled its sample count. The scenes of the gallery have
@@ -66,7 +67,7 @@ impl Schedule {
     /// Returns `None` without an error target, or before the first noise estimate.
     pub fn predict(&self, usual_slopes: [f64; 2]) -> Option<Prediction> {
         let (criterion, target) = self.target()?;
-        let rmse = criterion.of_picture(self.noise?);
+        let rmse = criterion.of(self.noise?.rmse);
         let target = AIM * target;
         let slopes = [false, true]
             .map(|glossy| self.fitted_slope(glossy).unwrap_or(usual_slopes[usize::from(glossy)]));
@@ -92,7 +93,7 @@ impl Schedule {
         let mut heap: BinaryHeap<Candidate> =
             expected.iter().enumerate().filter_map(|(i, m)| allocation.candidate(i, m)).collect();
         while error > enough
-            && let Some(Candidate { count, tile, .. }) = heap.pop()
+            && let Some(Candidate { count: Reverse(count), tile: Reverse(tile), .. }) = heap.pop()
         {
             let samples = allocation.next_block(tile);
             if samples > 0 {

@@ -1,28 +1,22 @@
 //! Settings of the schedule: error measure, stop criteria, cap.
 
-use crate::film::{Mse, Noise};
+use crate::film::ByMeasure;
 
 /// Error that adaptive sampling minimises.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Criterion {
     /// RMSE of the displayed picture, in 8-bit levels.
+    #[default]
     Levels,
     /// RMSE of the picture in linear radiance.
     Linear,
 }
 
 impl Criterion {
-    pub(super) fn of(self, error: Mse) -> f64 {
+    pub(super) fn of(self, error: ByMeasure) -> f64 {
         match self {
             Self::Levels => error.levels,
             Self::Linear => error.linear,
-        }
-    }
-
-    pub(super) fn of_picture(self, noise: Noise) -> f64 {
-        match self {
-            Self::Levels => noise.rmse_levels,
-            Self::Linear => noise.rmse_linear,
         }
     }
 }
@@ -69,7 +63,7 @@ impl StoppedBy {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settings {
     /// `true` if tiles may get different numbers of samples according to their noise.
     pub adaptive: bool,
@@ -84,6 +78,6 @@ impl Settings {
     /// Creates settings that minimise the displayed error. `rays_per_pixel` is 0; a renderer
     /// replaces it by the value of the scene.
     pub fn new(adaptive: bool, stop: Stop) -> Self {
-        Self { adaptive, criterion: Criterion::Levels, rays_per_pixel: 0, stop }
+        Self { adaptive, stop, ..Self::default() }
     }
 }

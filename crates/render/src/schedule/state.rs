@@ -11,7 +11,7 @@
 //! - the jobs of the current round, its jobs that remain to be traced, and the tiles.
 
 use crate::film::file::Fields;
-use crate::film::{Mse, Noise, TileNoise};
+use crate::film::{ByMeasure, Noise, TileNoise};
 use crate::schedule::tile::Tile;
 use crate::schedule::{Criterion, MAX_SAMPLES, Schedule};
 use crate::wave::Job;
@@ -27,10 +27,9 @@ impl Schedule {
         out.extend([u8::from(self.estimate), self.replicate as u8]);
         out.push(u8::from(self.noise.is_some()));
         if let Some(noise) = self.noise {
-            let Noise { rmse_linear, rmse_levels, p95_levels, worst_levels, effective_pixels } =
-                noise;
-            floats(&[rmse_linear, rmse_levels, p95_levels, worst_levels], &mut out);
-            mse(effective_pixels, &mut out);
+            by_measure(noise.rmse, &mut out);
+            floats(&[noise.p95_levels], &mut out);
+            by_measure(noise.effective_pixels, &mut out);
         }
         length(self.convergence.points.len(), &mut out);
         self.convergence.points.iter().for_each(|(rays, noise)| floats(&[*rays, *noise], &mut out));
@@ -66,11 +65,9 @@ impl Schedule {
         self.replicate = usize::from(flag(&mut fields)?);
         if flag(&mut fields)? {
             self.noise = Some(Noise {
-                rmse_linear: error(&mut fields)?,
-                rmse_levels: error(&mut fields)?,
+                rmse: decode_by_measure(&mut fields)?,
                 p95_levels: error(&mut fields)?,
-                worst_levels: error(&mut fields)?,
-                effective_pixels: decode_mse(&mut fields)?,
+                effective_pixels: decode_by_measure(&mut fields)?,
             });
         }
         let points = fields.u32()?;
@@ -124,13 +121,13 @@ fn decode_tile(tile: &mut Tile, fields: &mut Fields) -> Option<()> {
 
 fn encode_estimate(noise: &TileNoise, out: &mut Vec<u8>) {
     out.extend(noise.samples.to_le_bytes());
-    [noise.reported, noise.allocation, noise.squares].into_iter().for_each(|m| mse(m, out));
+    [noise.reported, noise.allocation, noise.squares].into_iter().for_each(|m| by_measure(m, out));
 }
 
 fn decode_estimate(pixels: u32, fields: &mut Fields) -> Option<TileNoise> {
     let samples = fields.u32().filter(|samples| *samples > 0)?;
     let [reported, allocation, squares] =
-        [decode_mse(fields)?, decode_mse(fields)?, decode_mse(fields)?];
+        [decode_by_measure(fields)?, decode_by_measure(fields)?, decode_by_measure(fields)?];
     Some(TileNoise { reported, allocation, squares, pixels, samples })
 }
 
@@ -142,12 +139,12 @@ fn floats(values: &[f64], out: &mut Vec<u8>) {
     values.iter().for_each(|value| out.extend(value.to_le_bytes()));
 }
 
-fn mse(Mse { linear, levels }: Mse, out: &mut Vec<u8>) {
+fn by_measure(ByMeasure { linear, levels }: ByMeasure, out: &mut Vec<u8>) {
     floats(&[linear, levels], out);
 }
 
-fn decode_mse(fields: &mut Fields) -> Option<Mse> {
-    Some(Mse { linear: error(fields)?, levels: error(fields)? })
+fn decode_by_measure(fields: &mut Fields) -> Option<ByMeasure> {
+    Some(ByMeasure { linear: error(fields)?, levels: error(fields)? })
 }
 
 /// Decodes an estimated error, which is infinite or NaN in extreme pictures, but not negative.

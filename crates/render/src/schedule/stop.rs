@@ -2,7 +2,7 @@
 
 use crate::film::Noise;
 use crate::schedule::tile::{DOUBLINGS, Tile};
-use crate::schedule::{Criterion, MAX_SAMPLES, Schedule, StoppedBy};
+use crate::schedule::{Criterion, Interval, MAX_SAMPLES, Schedule, StoppedBy};
 
 /// Number of effective pixels below which a single noise estimate does not end a render.
 ///
@@ -12,60 +12,42 @@ use crate::schedule::{Criterion, MAX_SAMPLES, Schedule, StoppedBy};
 /// 1.56, 1.23 and 1.11.
 const FEW_PIXELS_TO_STOP: f64 = 64.0;
 
-/// Lower and upper estimate of a number of seconds or rays.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
-    pub low: f64,
-    pub high: f64,
-}
-
-impl Interval {
-    /// Returns the interval of a number that is known.
-    pub fn exact(value: f64) -> Self {
-        Self { low: value, high: value }
-    }
-
-    /// Returns the number that is expected.
-    pub fn mean(self) -> f64 {
-        0.5 * (self.low + self.high)
-    }
-}
-
 impl Schedule {
-    /// Returns an estimate of the seconds left until the first stop criterion is
-    /// reached, after `seconds` seconds of rendering. `None` if no criterion can be extrapolated.
+    /// Estimates the seconds left until the first stop criterion is reached, after `seconds` seconds
+    /// of rendering. Returns `None` if no criterion can be extrapolated.
     pub fn eta_seconds(&self, seconds: f64) -> Option<Interval> {
         let by_noise = self.target().and_then(|(_, target)| self.seconds_to_error(target, seconds));
         let by_spp = self.settings.stop.spp.filter(|_| self.samples > 0).map(|spp| {
             let total = 2.0 * f64::from(spp.div_ceil(2)) * self.pixels() as f64;
             Interval::exact((total / self.samples as f64 - 1.0).max(0.0) * seconds)
         });
-        let by_time = self.settings.stop.seconds.map(|s| Interval::exact((s - seconds).max(0.0)));
-        let estimates = [by_noise, by_spp, by_time].into_iter().flatten();
-        estimates.reduce(|a, b| Interval { low: a.low.min(b.low), high: a.high.min(b.high) })
+        let by_time =
+            self.settings.stop.seconds.map(|end| Interval::exact((end - seconds).max(0.0)));
+        let first =
+            |a: Interval, b: Interval| Interval { low: a.low.min(b.low), high: a.high.min(b.high) };
+        [by_noise, by_spp, by_time].into_iter().flatten().reduce(first)
     }
 
-    /// Returns an estimate of the seconds left until the displayed RMSE falls to `levels` 8-bit
-    /// levels, whatever the stop criteria are. Returns `None` before the first estimate of the noise.
+    /// Estimates the seconds left until the displayed RMSE falls to `levels` 8-bit levels, whatever
+    /// the stop criteria are. Returns `None` before the first estimate of the noise.
     pub fn seconds_to_noise(&self, levels: f64, seconds: f64) -> Option<Interval> {
         let noise = self.noise?;
-        if noise.rmse_levels <= levels {
+        if noise.rmse.levels <= levels {
             return Some(Interval::exact(0.0));
         }
         let target = match self.settings.criterion {
             Criterion::Levels => levels,
-            Criterion::Linear => levels * noise.rmse_linear / noise.rmse_levels,
+            Criterion::Linear => levels * noise.rmse.linear / noise.rmse.levels,
         };
         self.seconds_to_error(target, seconds)
     }
 
-    /// Returns an estimate of the seconds left until the error falls to `target`, in the unit of the
-    /// criterion. Returns `None` before the first estimate of the noise.
+    /// Estimates the seconds left until the error falls to `target`, in the unit of the criterion.
+    /// Returns `None` before the first estimate of the error.
     fn seconds_to_error(&self, target: f64, seconds: f64) -> Option<Interval> {
-        let Interval { low, high } = self.convergence.rays_needed(target)?;
+        let needed = self.convergence.rays_needed(target)?;
         let per_ray = seconds / self.rays.max(1) as f64;
-        let seconds_until = |rays: f64| (rays - self.rays as f64).max(0.0) * per_ray;
-        Some(Interval { low: seconds_until(low), high: seconds_until(high) })
+        Some(needed.map(|rays| (rays - self.rays as f64).max(0.0) * per_ray))
     }
 
     /// Returns the share of the render that is done, 0..=1: elapsed time over expected total time.
@@ -90,10 +72,10 @@ impl Schedule {
     pub(super) fn reason_to_stop(&self, seconds: f64) -> Option<StoppedBy> {
         let stop = &self.settings.stop;
         if let Some(noise) = self.largest_recent_noise().filter(|_| self.min_samples_reached()) {
-            if stop.noise_levels.is_some_and(|t| noise.rmse_levels <= t) {
+            if stop.noise_levels.is_some_and(|t| noise.rmse.levels <= t) {
                 return Some(StoppedBy::Noise);
             }
-            if stop.rmse_linear.is_some_and(|t| noise.rmse_linear <= t) {
+            if stop.rmse_linear.is_some_and(|t| noise.rmse.linear <= t) {
                 return Some(StoppedBy::Rmse);
             }
             if self.capped_at_target() {

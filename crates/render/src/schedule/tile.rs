@@ -1,13 +1,13 @@
 //! State of one tile in the schedule: sample counts and noise estimates.
 
-use crate::film::{Mse, TileNoise};
+use crate::film::{ByMeasure, TileNoise};
 use crate::schedule::{Criterion, USUAL_SLOPE};
 use crate::wave::JobReport;
 
 /// Largest number of doublings of the sample count over which a tile's slope is fitted.
 pub(super) const DOUBLINGS: u32 = 3;
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Tile {
     /// Number of the tile's pixels inside the picture.
     pub pixels: u32,
@@ -24,10 +24,6 @@ pub(super) struct Tile {
 }
 
 impl Tile {
-    pub fn new(pixels: u32) -> Self {
-        Self { pixels, done: 0, rays: 0, glossy: false, error: None, history: Vec::new() }
-    }
-
     /// Records the report of a job. An estimate from at least `light_period` samples discards the
     /// estimates from fewer samples.
     pub fn record(&mut self, report: &JobReport, light_period: u32) {
@@ -93,7 +89,8 @@ impl Tile {
         let earlier = self.history.iter().rev().nth(doublings).or(self.history.first())?;
         let growth = f64::from(latest.samples) / f64::from(earlier.samples);
         let factor = growth.powf(-2.0 * USUAL_SLOPE);
-        let scaled = |mse: Mse| Mse { linear: factor * mse.linear, levels: factor * mse.levels };
+        let scaled =
+            |mse: ByMeasure| ByMeasure { linear: factor * mse.linear, levels: factor * mse.levels };
         let (reported, allocation) = (scaled(earlier.reported), scaled(earlier.allocation));
         Some(TileNoise { reported, allocation, ..latest })
     }

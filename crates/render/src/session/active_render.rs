@@ -258,7 +258,7 @@ impl ActiveRender {
         }
         let start = Instant::now();
         let RenderState { world, film, .. } = &self.state;
-        let size = [film.width(), film.height()];
+        let size = [film.header.width, film.header.height];
         let trace = |points: &[[f64; 2]], hits: &mut [_]| world.first_hit(points, hits);
         let first_hits = FirstHitBuffer::new(size, [columns, rows], trace, &context.pool);
         self.first_hits = Some(Arc::new(first_hits));

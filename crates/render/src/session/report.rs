@@ -37,10 +37,10 @@ pub struct Report {
     /// Seconds from the start of the compilation to the first complete picture.
     pub first_picture_seconds: Option<f64>,
     pub noise: Option<Noise>,
-    /// Estimate of the seconds left until the render ends.
+    /// Estimated seconds left until the render ends.
     pub eta_seconds: Option<Interval>,
-    /// Estimates of the seconds left until each of the [`QUALITIES`] is reached,
-    /// whatever the stop criteria are.
+    /// Estimated seconds left until each of the [`QUALITIES`] is reached, whatever the stop criteria
+    /// are.
     pub quality_seconds: [Option<Interval>; QUALITIES.len()],
     /// Share of the render that is done, 0..=1: of the expected time, or of the samples of a plan.
     pub progress: Option<f64>,
@@ -75,7 +75,7 @@ impl Report {
         let counts = (0..film.tile_count()).map(|tile| film.spp(tile));
         let (min, max) = counts.fold((u32::MAX, 0), |(min, max), n| (min.min(n), max.max(n)));
         let samples = film.samples();
-        let pixels = film.width() * film.height();
+        let pixels = film.header.width * film.header.height;
         Self {
             spp: Spp { min, mean: samples as f64 / pixels as f64, max },
             samples,

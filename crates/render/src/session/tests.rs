@@ -234,8 +234,8 @@ fn reports_hold_noise_and_time_left() {
     let mut session = session(endless());
     session.set_scene(scene(64));
     let running = wait_for(&session, |s| s.report.noise.is_some()).report;
-    let Noise { rmse_levels, .. } = running.noise.unwrap();
-    assert!(rmse_levels > 0.0 && rmse_levels < 255.0);
+    let Noise { rmse, .. } = running.noise.unwrap();
+    assert!(rmse.levels > 0.0 && rmse.levels < 255.0);
     let Interval { low, high } = running.eta_seconds.expect("a time");
     assert!(low > 0.0 && high >= low);
     assert!(running.progress.is_some_and(|p| p > 0.0 && p < 1.0));

@@ -2,7 +2,7 @@
 //! replaced, and publishes snapshots of the sum of all films.
 
 use crate::export::update_metadata;
-use crate::film::file::FilmFileHeader;
+use crate::film::file::{FilmFileHeader, SavedFilm};
 use crate::film::{Display, Estimator, IncrementalDownsample, Noise, TileNoise};
 use crate::plan::{FilmFiles, WatchedShards};
 use crate::session::Command;
@@ -108,17 +108,22 @@ impl Watcher {
     }
 
     fn picture(&self) -> Option<Picture<'_>> {
-        let ((_, film), Shown { header, report, .. }) =
+        let (sum, Shown { header, report, .. }) =
             self.films.sum.as_ref().zip(self.shown.as_ref())?;
-        Some(Picture { film, weights: &header.weights, report, source: Source::Files(header) })
+        Some(Picture {
+            film: &sum.film,
+            weights: &header.weights,
+            report,
+            source: Source::Files(header),
+        })
     }
 
     /// Updates `shown`: estimates the noise of the sum of all films and reports on it.
     fn estimate(&mut self) {
-        self.shown = self.films.sum.as_ref().and_then(|(header, film)| {
+        self.shown = self.films.sum.as_ref().and_then(|SavedFilm { header, film }| {
             let mut header = header.clone();
             header.display = self.display.unwrap_or(header.display);
-            let estimator = Estimator::new(film.scales(), &header.weights, &header.display);
+            let estimator = Estimator::new(&film.header.scales, &header.weights, &header.display);
             let pool = &self.context.pool;
             let tiles = tile_estimates(film, &estimator, pool, &AtomicBool::new(false))?;
             let report = Report {
@@ -136,7 +141,9 @@ impl Watcher {
     }
 
     fn publish(&mut self) {
-        let (Some((_, film)), Some(shown)) = (&self.films.sum, &self.shown) else { return };
+        let (Some(SavedFilm { film, .. }), Some(shown)) = (&self.films.sum, &self.shown) else {
+            return;
+        };
         let Shown { header, report, tiles } = shown;
         let (report, weights) = (report.clone(), header.weights.clone());
         let snapshot = Snapshot { report, weights, ..Snapshot::default() };
@@ -155,7 +162,7 @@ impl WatchReport {
     fn new(films: &FilmFiles) -> Self {
         let settings = films.plan.as_ref().map(|plan| &plan.settings);
         let (size, display, source) = match (&films.sum, settings) {
-            (Some((header, _)), _) => {
+            (Some(SavedFilm { header, .. }), _) => {
                 (Some(header.film.size()), header.display, header.source().unwrap_or_default())
             }
             (None, Some(plan)) => (Some(plan.size), plan.display, plan.source.as_str()),

@@ -27,7 +27,7 @@ pub use hash::{Fnv1a64, fnv1a64};
 pub use key_node::{KeyNode, KeyValue, node_at, node_at_mut};
 pub use number_range::{NumberRange, number};
 pub(crate) use one_of::{kinds, one_of};
-pub use order::{ascending, sort_by_number, total_order};
+pub use order::{ascending, from_total_order, sort_by_number, total_order};
 pub use round::{floor_log10, rotated_y, round_fine, round_nice, round_significant, rounded_to};
 pub use text::{sanitized, truncated};
 pub(crate) use toml_value::{integer, read_value, written};

@@ -22,9 +22,14 @@ pub fn total_order(x: f64) -> i64 {
     bits ^ ((bits >> 63) as u64 >> 1) as i64
 }
 
+/// Returns the number that [`total_order`] has converted to `x`.
+pub fn from_total_order(x: i64) -> f64 {
+    f64::from_bits(total_order(f64::from_bits(x as u64)) as u64)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{sort_by_number, total_order};
+    use super::{from_total_order, sort_by_number, total_order};
 
     #[test]
     fn items_with_equal_numbers_keep_their_order() {
@@ -42,6 +47,7 @@ mod tests {
         let numbers = numbers.into_iter().chain([f64::INFINITY, f64::NAN, -f64::NAN]);
         let numbers: Vec<f64> = numbers.collect();
         for a in &numbers {
+            assert_eq!(from_total_order(total_order(*a)).to_bits(), a.to_bits());
             for b in &numbers {
                 assert_eq!(total_order(*a).cmp(&total_order(*b)), a.total_cmp(b), "{a} {b}");
             }

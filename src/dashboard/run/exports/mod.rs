@@ -40,14 +40,15 @@ impl Exporter {
         let picture = picture.ok_or("there is no picture to write")?;
         let header = picture.header(|scene| self.provenance(scene));
         let write = |path: &Path| {
-            let output = ImageOutput::from_path(path)?.create_new();
+            let mut output = ImageOutput::from_path(path)?;
+            output.existing = Existing::Refuse;
             output.write(&header, Depth::Eight, &mut &*picture.film)
         };
         let stem = self.stem(header.source().unwrap_or_default());
         let path = numbered(&stem, format.extension(), write)?;
-        let [width, height] = [picture.film.width(), picture.film.height()];
+        let size @ [width, height] = [picture.film.header.width, picture.film.header.height];
         let (spp, noise) = (picture.report.spp.mean, picture.report.noise);
-        let noise = noise.map_or("unknown".to_string(), |n| format!("{:.2} levels", n.rmse_levels));
+        let noise = noise.map_or("unknown".to_string(), |n| format!("{:.2} levels", n.rmse.levels));
         Ok(Exported {
             description: format!("{width}x{height}  {spp:.0} spp  noise {noise}"),
             advice: format!("o shows it, y copies the path  ·  scp {} .", scp(&path)),

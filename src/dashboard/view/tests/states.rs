@@ -115,7 +115,7 @@ fn resting(model: &mut Model, by: StoppedBy) {
     let snapshot = model.snapshot.as_mut().unwrap();
     snapshot.report.state = State::Finished(by);
     snapshot.report.eta_seconds = None;
-    snapshot.report.noise.as_mut().unwrap().rmse_levels = 0.49;
+    snapshot.report.noise.as_mut().unwrap().rmse.levels = 0.49;
 }
 
 fn notice(model: &mut Model, tone: Tone, text: &str) {

@@ -5,8 +5,8 @@ use crate::file_error::{self, FileError, begins_with};
 use crate::film::display::{Display, Tone};
 use crate::film::file::encode::CHECKSUM_BYTES;
 use crate::film::file::{
-    DONE, FilmFileHeader, HEAD, MAGIC, MAX_SIDE, META, TILES, TILES_PER_CHUNK, Tag, VERSION,
-    tile_record,
+    DONE, FilmFileHeader, HEAD, MAGIC, MAX_SIDE, META, SavedFilm, TILES, TILES_PER_CHUNK, Tag,
+    VERSION, tile_record,
 };
 use crate::film::light_weights::LightWeights;
 use crate::film::store::{Film, Header};
@@ -108,10 +108,10 @@ impl<R: Read> FilmReader<R> {
     }
 
     /// Reads header and film.
-    pub fn read(self) -> Result<(FilmFileHeader, Film), FileError> {
+    pub fn read(self) -> Result<SavedFilm, FileError> {
         let mut film = Film::new(self.header.film.clone());
         let header = self.add_to(&mut film)?;
-        Ok((header, film))
+        Ok(SavedFilm { header, film })
     }
 
     /// Adds the samples of the file to `film`, which may contain some of them after an error.

@@ -39,7 +39,7 @@ pub use encode::{EncodedFilm, text};
 
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
-use crate::film::store::Header;
+use crate::film::store::{Film, Header};
 use std::collections::BTreeMap;
 
 /// First bytes of a film file.
@@ -73,6 +73,13 @@ pub struct FilmFileHeader {
     pub metadata: Vec<(String, String)>,
     /// Further chunks by tag, other than `HEAD`, `META`, `TILE` and `DONE`.
     pub chunks: BTreeMap<Tag, Vec<u8>>,
+}
+
+/// Contents of a film file.
+#[derive(Debug)]
+pub struct SavedFilm {
+    pub header: FilmFileHeader,
+    pub film: Film,
 }
 
 impl FilmFileHeader {

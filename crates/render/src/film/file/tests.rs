@@ -13,7 +13,7 @@ use std::path::Path;
 fn sample_film() -> Film {
     let mut film = film(150, 37, &[2f64.powi(20), 2f64.powi(-3)]);
     let mut rng = Rng(7);
-    each_tile(&mut film, |tile, [x0, y0]| {
+    each_tile(&mut film, |tile, [x0, _]| {
         if x0 / TILE % 4 == 3 {
             return;
         }
@@ -50,7 +50,7 @@ fn pieces(film: &Film) -> Vec<Vec<u8>> {
     EncodedFilm::new(&header_of(film), film, None).pieces
 }
 
-fn read(bytes: &[u8]) -> Result<(FilmFileHeader, Film), FileError> {
+fn read(bytes: &[u8]) -> Result<SavedFilm, FileError> {
     FilmReader::new(Path::new("a.zk"), Cursor::new(bytes), bytes.len() as u64)?.read()
 }
 
@@ -58,7 +58,7 @@ fn read(bytes: &[u8]) -> Result<(FilmFileHeader, Film), FileError> {
 fn film_file_restores_every_bit() {
     let film = sample_film();
     let bytes = pieces(&film).concat();
-    let (header, restored) = read(&bytes).unwrap();
+    let SavedFilm { header, film: restored } = read(&bytes).unwrap();
     assert_eq!(header, header_of(&film));
     assert_eq!(restored.bytes(), film.bytes());
     assert_eq!(restored.saturated_samples(), film.saturated_samples());
@@ -75,7 +75,7 @@ fn saturated_sums_are_restored() {
         tile.advance(0, 1 << 20);
     });
     assert_eq!(film.saturated_pixels(), 2);
-    let (_, restored) = read(&pieces(&film).concat()).unwrap();
+    let restored = read(&pieces(&film).concat()).unwrap().film;
     assert_eq!(restored.saturated_pixels(), 2);
     assert_eq!(restored.bytes(), film.bytes());
 }

@@ -73,7 +73,7 @@ fn noise_target_is_reached_without_overshoot() {
             let mut model = Model::random(clustered(600, 0.3), 64, seed);
             let (schedule, reason) = model.finish(until(noise(target), adaptive));
             assert_eq!(reason, StoppedBy::Noise);
-            let reached = schedule.noise.unwrap().rmse_levels;
+            let reached = schedule.noise.unwrap().rmse.levels;
             assert!(reached <= target, "{reached} > {target}");
             // A uniform render stops only at multiples of `SAMPLE_ALIGNMENT` samples per replicate.
             // Its error may therefore end further below the target than that of an adaptive render.
@@ -94,7 +94,7 @@ fn estimate_stays_unbiased_when_it_decides() {
             let truth = truth.map(|(i, t)| Truth { sigma: t.sigma + 10.0 * (i % 7) as f64, ..t });
             let mut model = Model::random(truth.collect(), effective, seed);
             let (schedule, _) = model.finish(until(spp(256), true));
-            ratio += model.rmse() / schedule.noise.unwrap().rmse_levels / f64::from(runs as u32);
+            ratio += model.rmse() / schedule.noise.unwrap().rmse.levels / f64::from(runs as u32);
         }
         assert!((0.98..1.045).contains(&ratio), "{effective}: true/estimate {ratio}");
     }

@@ -101,7 +101,7 @@ fn new_estimates_replace_the_old_ones() {
     let estimates: Vec<_> = (0..36).map(|tile| Some(model.estimate(tile))).collect();
     schedule.set_estimates(&estimates);
     let after = schedule.noise.unwrap();
-    assert!((after.rmse_levels / before.rmse_levels - 3.0).abs() < 1e-9);
+    assert!((after.rmse.levels / before.rmse.levels - 3.0).abs() < 1e-9);
     assert_eq!(schedule.samples, samples);
     // The convergence of the new picture is unknown. The estimated range is wide, but contains the
     // true time.

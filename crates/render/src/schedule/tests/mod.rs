@@ -6,7 +6,7 @@ mod prediction;
 mod stops;
 
 use crate::film::testing::Rng;
-use crate::film::{Mse, TileNoise};
+use crate::film::{ByMeasure, TileNoise};
 use crate::schedule::*;
 use crate::wave::JobReport;
 use crate::wave::WaveReport;
@@ -14,7 +14,7 @@ use crate::wave::WaveReport;
 /// Value of [`TileNoise::squares`] in all simulated estimates: the sum of e^2 over the pixels of a
 /// tile, where e is the squared error of a pixel. It is nearly 0, as for an error that is spread
 /// over very many pixels.
-const SPREAD_OUT: Mse = Mse { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
+const SPREAD_OUT: ByMeasure = ByMeasure { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
 /// Light period of the simulated pictures, in samples per replicate. From this count on, the tiles
 /// in [`Model::periodic`] have no error.
 const PERIOD: f64 = 16.0;
@@ -54,7 +54,7 @@ struct Model {
     /// Numbers of the tiles that have no error from [`PERIOD`] samples per replicate on.
     periodic: Vec<usize>,
     /// Number of samples that together trace a shadow ray to each light once; see
-    /// [`Schedule::with_light_period`].
+    /// [`Schedule::light_period`].
     light_period: u32,
 }
 
@@ -88,7 +88,7 @@ impl Model {
     fn estimate(&self, tile: usize) -> TileNoise {
         let n = f64::from(self.counts[0][tile]);
         let [a, b] = [&self.walks[0][tile], &self.walks[1][tile]];
-        let mse = |levels: f64| Mse { levels, linear: levels * 1e-6 };
+        let mse = |levels: f64| ByMeasure { levels, linear: levels * 1e-6 };
         let [mut allocation, mut reported] = [0, 1].map(|half| {
             if a.is_empty() {
                 return mse(self.true_mse(tile));
@@ -150,7 +150,8 @@ impl Model {
     }
 
     fn schedule(&self, settings: Settings) -> Schedule {
-        Schedule::new(&self.pixels, settings).with_light_period(self.light_period)
+        let light_period = self.light_period;
+        Schedule { light_period, ..Schedule::new(&self.pixels, settings) }
     }
 
     /// Renders the simulated picture to the end, at one nanosecond per ray. Returns the schedule

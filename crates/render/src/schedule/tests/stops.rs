@@ -46,7 +46,7 @@ fn caps_hold_for_glossy_tiles_only() {
         assert!(schedule.tiles.iter().all(|t| !t.glossy || t.done == 20));
         assert!(schedule.tiles.iter().any(|t| !t.glossy && t.done > 200));
         assert!(
-            schedule.noise.unwrap().rmse_levels > 1.0,
+            schedule.noise.unwrap().rmse.levels > 1.0,
             "the noise is that of the whole picture"
         );
 
