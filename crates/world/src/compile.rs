@@ -150,9 +150,10 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     /// Returns the limits of indirect diffuse light; `None` if the scene has none.
     fn diffuse_limits(&self, scene: &Scene) -> Option<DiffuseLimits> {
         let IntegratorSettings { max_diffuse_depth: depth, caustics, .. } = scene.trace;
-        let is_matt = |m: &&Material| m.diffuse > 0.0 && m.color.0 != [0.0; 3];
+        let is_diffuse = |m: &&Material| m.diffuse > 0.0 && m.color.0 != [0.0; 3];
         let traced = scene.trace.ray_types == RayTypes::Full && depth > 0;
-        (traced && self.materials.iter().any(is_matt)).then_some(DiffuseLimits { depth, caustics })
+        (traced && self.materials.iter().any(is_diffuse))
+            .then_some(DiffuseLimits { depth, caustics })
     }
 
     fn has_secondary(&self) -> bool {
@@ -392,17 +393,31 @@ impl<L: SimdFloat> World<L> {
     ) -> Self {
         let default_material = Material::default();
         let camera = PerspectiveCamera::new(&scene.camera, scene.film.size, recentered.origin);
-        let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
+        let materials = CompiledMaterials::new(scene, &default_material);
         let moved = materials.move_emissive_sheets(recentered, camera.eye);
         let recentered = moved.as_ref().unwrap_or(recentered);
+        let reflected = (materials.has_direct(), materials.has_ambient());
+        let groups = LightGroups::new(scene, reflected, merge_lights);
+        let mut world = Self::from_parts(scene, recentered, camera, materials, groups);
+        world.info.inventory = inventory(scene, &world);
+        world
+    }
+
+    /// Compiles everything that depends on the geometry: lights, transmission, culling. The
+    /// inventory stays empty.
+    fn from_parts(
+        scene: &Scene,
+        recentered: &RecenteredGeometry,
+        camera: PerspectiveCamera,
+        materials: CompiledMaterials<L::Scalar>,
+        groups: LightGroups,
+    ) -> Self {
         let geometry = aggregate(scene, &recentered.forms);
         let primitives = &geometry.sources;
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
         let textures = SurfaceTextures::new(scene, primitives, recentered.origin, |id| {
             materials.materials[materials.index(id) as usize]
         });
-        let reflected = (materials.has_direct(), materials.has_ambient());
-        let groups = LightGroups::new(scene, reflected, merge_lights);
         let (lights, scales) =
             CompiledLights::new(scene, recentered, &materials, primitives, &camera, &groups);
         let start = start_region(scene, &camera);
@@ -410,12 +425,12 @@ impl<L: SimdFloat> World<L> {
             NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, &start);
         let nested = nested_dielectrics.as_ref();
         let outside_only = outside_only(&recentered.forms, primitives, &start, nested);
-        let light_bounds = lights.bounds();
-        let culling = culling(scene, recentered, &geometry, &camera, light_bounds, &outside_only);
+        let bounds = lights.bounds();
+        let culling = culling(scene, recentered, &geometry, &camera, bounds, &outside_only);
         let smooth = geometry.is_smooth() || textures.is_bumped();
         let colored = geometry.is_colored() || textures.is_colored();
         let has_background = scene.background.color.0 != [0.0; 3];
-        let mut world = Self {
+        Self {
             smooth,
             colored,
             simple: !smooth && !colored && geometry.has_no_tree(),
@@ -423,7 +438,7 @@ impl<L: SimdFloat> World<L> {
             shadows: scene.trace.ray_types >= RayTypes::Shadows && !geometry.is_empty(),
             depth: if materials.has_secondary() { scene.trace.max_depth } else { 0 },
             diffuse_limits: materials.diffuse_limits(scene),
-            min_weight: scene.trace.min_throughput,
+            min_throughput: scene.trace.min_throughput,
             fold: scene.trace.below_horizon == BelowHorizon::Fold,
             nested_dielectrics,
             geometry,
@@ -445,8 +460,6 @@ impl<L: SimdFloat> World<L> {
             culling,
             camera,
             jitter: scene.film.filter == Filter::Box,
-        };
-        world.info.inventory = inventory(scene, &world);
-        world
+        }
     }
 }

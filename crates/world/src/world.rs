@@ -89,7 +89,7 @@ pub struct World<L: SimdFloat> {
     /// `None` if the scene has no indirect diffuse light.
     pub(super) diffuse_limits: Option<DiffuseLimits>,
     /// Smallest throughput, in its largest channel, with which a path continues.
-    pub(super) min_weight: f64,
+    pub(super) min_throughput: f64,
     /// See [`BsdfQuery::fold`](zerkalo_scene::material::BsdfQuery::fold).
     pub(super) fold: bool,
     /// Camera, in coordinates relative to the scene's centre.
@@ -143,8 +143,8 @@ impl<L: SimdFloat> World<L> {
 
     /// Returns the lanes whose paths continue with `throughput`.
     #[inline(always)]
-    pub(super) fn reaches_min_weight(&self, throughput: Vec3<L>) -> L::Mask {
+    pub(super) fn reaches_min_throughput(&self, throughput: Vec3<L>) -> L::Mask {
         let max_throughput = throughput.max_element();
-        max_throughput.gt(L::zero()) & max_throughput.ge(L::from_f64(self.min_weight))
+        max_throughput.gt(L::zero()) & max_throughput.ge(L::from_f64(self.min_throughput))
     }
 }

@@ -141,10 +141,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let lit = value.max_element().gt(L::zero());
             let occluded = |lit| {
                 let ray = Ray { origin, direction: light.wi };
-                let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
-                let lanes = lit.and_not(occluded);
                 let (emitters, geometry) = (&world.lights.emitters, &world.geometry);
-                occluded | emitters.covered(index, geometry, &ray, light.distance, lanes)
+                emitters.occluded(index, geometry, &ray, light.distance, lit, occluders)
             };
             self.add_light(source.group, lit, occluded, |vertex, _| {
                 source.emitted(vertex.unoccluded(value, light))

@@ -128,7 +128,7 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         };
         let lanes = self.lanes
             & direction.dot(self.geometric).gt(L::zero())
-            & path.throughput.max_element().ge(L::from_f64(world.min_weight));
+            & path.throughput.max_element().ge(L::from_f64(world.min_throughput));
         Branch { path, lanes, media: self.media, bounce: 0, coincident: self.coincident }
     }
 }

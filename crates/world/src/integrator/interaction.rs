@@ -87,21 +87,25 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
     }
 
     /// Replaces the hit points in `lanes` by the hit points of `other`. All masks of `self` must be
-    /// `false` in these lanes.
+    /// `false` in these lanes, and both must have the primitives of the whole packet.
     #[inline(always)]
     fn blend(&mut self, lanes: L::Mask, other: &Self) {
-        self.normal = Vec3::select(lanes, other.normal, self.normal);
-        self.geometric = Vec3::select(lanes, other.geometric, self.geometric);
-        self.albedo_factor = Vec3::select(lanes, other.albedo_factor, self.albedo_factor);
-        self.point = Vec3::select(lanes, other.point, self.point);
-        self.offset = L::select(lanes, other.offset, self.offset);
-        self.front = self.front | other.front;
-        self.bsdf = L::select(lanes, other.bsdf, self.bsdf);
-        self.diffuse = Vec3::select(lanes, other.diffuse, self.diffuse);
-        self.has_bsdf = self.has_bsdf | other.has_bsdf;
-        self.direct_mask = self.direct_mask | other.direct_mask;
-        self.highlight_mask = self.highlight_mask | other.highlight_mask;
-        self.reflecting = self.reflecting | other.reflecting;
+        *self = Self {
+            normal: Vec3::select(lanes, other.normal, self.normal),
+            geometric: Vec3::select(lanes, other.geometric, self.geometric),
+            point: Vec3::select(lanes, other.point, self.point),
+            offset: L::select(lanes, other.offset, self.offset),
+            front: self.front | other.front,
+            primitive: self.primitive,
+            bsdf: L::select(lanes, other.bsdf, self.bsdf),
+            albedo_factor: Vec3::select(lanes, other.albedo_factor, self.albedo_factor),
+            diffuse: Vec3::select(lanes, other.diffuse, self.diffuse),
+            has_bsdf: self.has_bsdf | other.has_bsdf,
+            direct_mask: self.direct_mask | other.direct_mask,
+            highlight_mask: self.highlight_mask | other.highlight_mask,
+            reflecting: self.reflecting | other.reflecting,
+            covered: self.covered | other.covered,
+        };
     }
 }
 

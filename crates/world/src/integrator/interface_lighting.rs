@@ -146,12 +146,11 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let lit = side.lanes & arrives & value.max_element().gt(L::zero());
         let occluded = |lit| {
             let (ray, t_max) = (Ray { origin: side.origin, direction: light.wi }, light.distance);
-            let occluded = world.geometry.occluded(&ray, t_max, lit, world.geometry.all());
-            emitter.map_or(occluded, |index| {
-                let lanes = lit.and_not(occluded);
-                let (emitters, geometry) = (&world.lights.emitters, &world.geometry);
-                occluded | emitters.covered(index, geometry, &ray, t_max, lanes)
-            })
+            let (emitters, geometry) = (&world.lights.emitters, &world.geometry);
+            match emitter {
+                Some(i) => emitters.occluded(i, geometry, &ray, t_max, lit, geometry.all()),
+                None => geometry.occluded(&ray, t_max, lit, geometry.all()),
+            }
         };
         self.add_light(source.group, lit, occluded, |vertex, _| {
             let radiance = vertex.path.throughput.component_mul(value);

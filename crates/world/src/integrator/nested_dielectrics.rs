@@ -101,16 +101,6 @@ pub(crate) struct Media<'a, L: SimdFloat> {
     pub stack: &'a MediumStack<L>,
 }
 
-impl<L: SimdFloat> Media<'_, L> {
-    /// Returns the fraction of light that is left after `distance` [scene units] by Beer's law;
-    /// `None` if no solid of the world absorbs light. `distance` may be the largest finite number.
-    #[inline(always)]
-    fn transmittance(&self, distance: L) -> Option<Vec3<L>> {
-        let absorption = self.nested_dielectrics.absorption.as_ref()?;
-        Some(transmittance(absorption, self.stack.top(), distance))
-    }
-}
-
 /// Returns `true` if the bounding box of an object overlaps the sphere `ball` or is infinite.
 pub(crate) fn may_reach(ball: &BoundingSphere, form: &Form) -> bool {
     let reaches = |bounds| box_distance(bounds, ball.center) <= ball.radius;
@@ -279,17 +269,17 @@ impl<L: SimdFloat> NestedDielectrics<L> {
     }
 }
 
-/// Returns the part of `radiance` that is left after `distance` in `media`; all if there are none.
+/// Returns the part of `radiance` that is left after `distance` [scene units] in `media`, by Beer's
+/// law; all if there are none. `distance` may be the largest finite number.
 #[inline(always)]
 pub(crate) fn attenuated<L: SimdFloat>(
     media: Option<Media<'_, L>>,
     radiance: Vec3<L>,
     distance: L,
 ) -> Vec3<L> {
-    match media.and_then(|media| media.transmittance(distance)) {
-        Some(transmittance) => radiance.component_mul(transmittance),
-        None => radiance,
-    }
+    let Some(Media { nested_dielectrics, stack }) = media else { return radiance };
+    let Some(absorption) = &nested_dielectrics.absorption else { return radiance };
+    radiance.component_mul(transmittance(absorption, stack.top(), distance))
 }
 
 /// Returns the fraction of light that is left after `distance` in the solids with `priority`:

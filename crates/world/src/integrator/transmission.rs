@@ -129,14 +129,10 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let lanes = add_background(world, path, hit.t, branch.lanes, media, out);
         let Some(first) = next_distinct(hit.primitive, lanes) else { return false };
         let mut interaction = interact::<_, false>(world, &path.ray, &hit, first, lanes);
-        let coincident =
-            self.cross_first(branch, &mut hit, &mut interaction, lanes, behind.as_ref());
-        let (path, stack) = (&mut branch.path, &branch.media);
+        let (ray, behind) = (&path.ray, behind.as_ref());
+        let coincident = self.cross_first(ray, stack, &mut hit, &mut interaction, lanes, behind);
         let reversed = coincident.as_ref().map(CoincidentState::reversed);
-        let interface_hit = self.interface_hit(&interaction, lanes, stack);
-        if let Some(interface_hit) = &interface_hit {
-            interaction.mask_out(interface_hit.suppressed);
-        }
+        let interface_hit = self.interface_hit(&mut interaction, lanes, stack);
         let interaction = &interaction;
         let mut vertex =
             Vertex { world, path, interaction, candidates, sampler, bounce, media, out };
@@ -171,12 +167,13 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
 
     /// Resolves hits of `lanes` on coincident surfaces: changes `hit` and `interaction` to the
     /// surface that the path crosses first. `behind` is the coincident surface behind the start
-    /// points of the rays, if one was found. Returns the state of rays that pass the surface, or
-    /// `None` if no surfaces coincide.
+    /// points of the rays, if one was found, and `media` are the media of the rays. Returns the
+    /// state of rays that pass the surface, or `None` if no surfaces coincide.
     #[inline(never)]
     fn cross_first(
         &self,
-        branch: &Branch<L>,
+        ray: &Ray<L>,
+        media: &MediumStack<L>,
         hit: &mut Hit<L>,
         interaction: &mut SurfaceInteraction<L>,
         lanes: L::Mask,
@@ -203,12 +200,11 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         if contact_lanes.any() {
             let coincident = CoincidentState::behind(interaction, contact_lanes, L::zero());
             let leaves = !interaction.front;
-            let first = contacts.first(&world.geometry, &coincident, leaves, &branch.media);
+            let first = contacts.first(&world.geometry, &coincident, leaves, media);
             if first.lanes.any() {
                 let CoincidentQuery { primitive, triangle, .. } = first;
                 hit.replace(first.lanes, &Hit { t: hit.t, primitive, triangle });
                 if let Some(distinct) = next_distinct(hit.primitive, lanes) {
-                    let ray = &branch.path.ray;
                     *interaction = interact::<_, false>(world, ray, hit, distinct, lanes);
                     offset = offset.max(interaction.offset);
                     if let (Some(next), true) = (behind, world.shadows) {
@@ -225,11 +221,11 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         coincident_lanes.any().then_some(coincident)
     }
 
-    /// Returns the hits of `lanes` on transmissive surfaces. Returns `None` if no lane hits such a
-    /// surface.
+    /// Returns the hits of `lanes` on transmissive surfaces, and removes the BSDF from suppressed
+    /// ones. Returns `None` if no lane hits such a surface.
     fn interface_hit(
         &self,
-        interaction: &SurfaceInteraction<L>,
+        interaction: &mut SurfaceInteraction<L>,
         lanes: L::Mask,
         media: &MediumStack<L>,
     ) -> Option<InterfaceHit<L>> {
@@ -241,7 +237,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 index = L::select(bsdf_lanes, L::splat(transmission.index), index);
             }
         }
-        self.nested_dielectrics.cross(interaction, transmissive, media, index)
+        let hit = self.nested_dielectrics.cross(interaction, transmissive, media, index)?;
+        interaction.mask_out(hit.suppressed);
+        Some(hit)
     }
 
     /// Finds the surface that rays of `branch` cross next if they start on one of several
@@ -383,8 +381,9 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             }
             path.throughput = Path::bounded(path.throughput);
         }
-        split.reflects = split.reflects & world.reaches_min_weight(split.reflected.throughput);
-        split.transmits = split.transmits & world.reaches_min_weight(split.transmitted.throughput);
+        split.reflects = split.reflects & world.reaches_min_throughput(split.reflected.throughput);
+        split.transmits =
+            split.transmits & world.reaches_min_throughput(split.transmitted.throughput);
         split
     }
 

@@ -76,7 +76,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
 
     /// Replaces the rays of the paths by reflected rays, with directions sampled from the
     /// reflection lobes. Returns the lanes whose paths continue: their new throughput is at least
-    /// [`min_weight`](World::min_weight). The density of the directions is computed only if
+    /// [`min_throughput`](World::min_throughput). The density of the directions is computed only if
     /// `emitters` is `true`.
     #[inline(always)]
     pub fn sample_reflection<const SIMPLE: bool>(&mut self, emitters: bool) -> L::Mask {
@@ -101,7 +101,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             path.throughput = Vec3::select(lanes, throughput, path.throughput);
         }
         self.path.ray.origin = interaction.ray_origin();
-        interaction.reflecting & world.reaches_min_weight(self.path.throughput)
+        interaction.reflecting & world.reaches_min_throughput(self.path.throughput)
     }
 
     /// Returns the query of BSDFs at the hit points.

@@ -17,8 +17,8 @@ use crate::lights::groups::{GroupedSource, LightGroupSource, LightGroups};
 use crate::world::LightSource;
 use std::collections::{HashMap, HashSet};
 use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3, distinct};
-use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId};
+use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, distinct};
+use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId, PrimitiveSet};
 use zerkalo_scene::Scene;
 use zerkalo_scene::light::{Emitter, LightSample};
 use zerkalo_scene::material::Material;
@@ -125,26 +125,31 @@ impl<S: Float> Emitters<S> {
         Some(source.with_light(source.light.as_ref()?.sample(origin, numbers)))
     }
 
-    /// Returns the lanes of `lanes` whose point, sampled on emitter number `index`, is just inside
-    /// an object that touches the emitter. The shadow rays `ray` reach the points at `distance`.
+    /// Returns the lanes of `wanted` whose shadow ray does not reach its end point, which was
+    /// sampled on emitter number `index`, at `distance`: one of `occluders` is in between, or the
+    /// point is just inside an object that touches the emitter.
     #[inline(always)]
-    pub fn covered<L: SimdFloat<Scalar = S>>(
+    pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
         index: usize,
         geometry: &Aggregate<L>,
         ray: &Ray<L>,
         distance: L,
-        lanes: L::Mask,
+        wanted: L::Mask,
+        occluders: &PrimitiveSet,
     ) -> L::Mask {
+        let occluded = geometry.occluded(ray, distance, wanted, occluders);
         match index.checked_sub(self.lights).and_then(|object| self.touching.get(object)) {
             Some(touching) if !touching.is_empty() => {
-                self.covered_by(touching, geometry, ray, distance, lanes)
+                let lanes = wanted.and_not(occluded);
+                occluded | self.covered_by(touching, geometry, ray, distance, lanes)
             }
-            Some(_) | None => L::mask(false),
+            Some(_) | None => occluded,
         }
     }
 
-    /// Returns the result of [`Self::covered`] for the objects `touching`, which touch the emitter.
+    /// Returns the lanes of `lanes` whose point, at `distance` along `ray`, is just inside one of
+    /// the objects `touching`, which touch the emitter of the point.
     #[inline(never)]
     fn covered_by<L: SimdFloat<Scalar = S>>(
         &self,
