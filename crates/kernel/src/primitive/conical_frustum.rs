@@ -10,8 +10,8 @@ use crate::primitive::canonical::{
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
-use crate::primitive::ellipsoid::{rounded_rows, times, transposed_times};
 use crate::primitive::form::Form;
+use crate::primitive::unit_space::{UnitLine, UnitSpace};
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
 
@@ -147,9 +147,8 @@ fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
 /// Conical frustum compiled for ray intersection. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct ConicalFrustum<S> {
-    /// Middle of the axis in the scene.
-    center: [S; 3],
-    unit_from_scene: [[S; 3]; 3],
+    /// Canonical space, whose origin is the middle of the axis.
+    unit_space: UnitSpace<S>,
     /// Slope k, from -1 (a cone) to 0 (a cylinder).
     slope: S,
     /// Radius m at the middle of the axis.
@@ -168,12 +167,10 @@ const AROUND2: f64 = 1.26;
 impl<S: Float> ConicalFrustum<S> {
     pub fn new(form: &ConicalFrustumForm) -> Self {
         let ConicalFrustumForm { scene_from_unit: m, top_radius } = form;
-        let inverse = m.matrix3.inverse();
-        let up = inverse.transpose() * DVec3::Z;
+        let up = m.matrix3.inverse().transpose() * DVec3::Z;
         let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
         Self {
-            center: center.to_array().map(S::from_f64),
-            unit_from_scene: rounded_rows(inverse),
+            unit_space: UnitSpace::new(center, m.matrix3),
             slope: S::from_f64(top_radius - 1.0),
             mid_radius: S::from_f64(0.5 * (1.0 + top_radius)),
             cap_normal: up.normalize().to_array().map(S::from_f64),
@@ -185,16 +182,10 @@ impl<S: Float> ConicalFrustum<S> {
 
 /// Segment of a ray's line inside a frustum.
 struct Chord<L: SimdFloat> {
-    /// Point of the line closest to the middle of the axis, in canonical space.
-    point: Vec3<L>,
-    /// Unit direction in canonical space.
-    direction: Vec3<L>,
-    /// Distance in the scene from the ray's origin to `point`.
-    start: L,
-    /// Length in the scene of a step of length 1 in canonical space.
-    scale: L,
-    /// Distance in canonical space from `point` to the chord's entry.
+    line: UnitLine<L>,
+    /// Position of the entry on the line.
     enter: L,
+    /// Position of the exit on the line.
     leave: L,
     /// Lanes whose ray enters through the lateral surface, not through base or cap.
     enters_side: L::Mask,
@@ -203,27 +194,20 @@ struct Chord<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> Chord<L> {
+    /// Returns the distances of entry and exit in the scene.
     fn distances(&self) -> (L, L) {
-        let distance = |t: L| self.start + t * self.scale;
+        let UnitLine { start, scale, .. } = self.line;
+        let distance = |t: L| t * scale - start * scale;
         (distance(self.enter), distance(self.leave))
     }
 }
 
-/// Returns the chord of each ray's line; `None` if no line hits the frustum. Distances are counted
-/// from the point of the line closest to the middle of the axis, so that a distant origin costs no
-/// precision.
+/// Returns the chord of each ray's line; `None` if no line hits the frustum.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let half = L::from_f64(0.5);
-    let f = times(&s.unit_from_scene, ray.origin - Vec3::splat(s.center));
-    let d = times(&s.unit_from_scene, ray.direction);
-    let scale = L::one() / d.length_squared().sqrt();
-    let d = d * scale;
-    // The second step removes the rounding error of the first step along the direction.
-    let back = -f.dot(d);
-    let p = d.mul_add(back, f);
-    let again = -p.dot(d);
-    let p = d.mul_add(again, p);
+    let line = s.unit_space.line(ray);
+    let UnitLine { point: p, direction: d, .. } = line;
     let near = p.length_squared().le(L::from_f64(AROUND2));
     if near.none() {
         return None;
@@ -238,10 +222,7 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     let (enter_ends, leave_ends) = (z0.min(z1), z0.max(z1));
     let (enter, leave) = (side.enter.max(enter_ends), side.leave.min(leave_ends));
     Some(Chord {
-        point: p,
-        direction: d,
-        start: (back + again) * scale,
-        scale,
+        line,
         enter,
         leave,
         enters_side: side.enter.ge(enter_ends),
@@ -314,7 +295,7 @@ fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3
     // The apex has no normal; the direction of the axis is used there.
     let inverse = L::select(rho.gt(L::zero()), L::one() / rho, L::zero());
     let normal = Vec3::new(x * inverse, y * inverse, -L::splat(s.slope));
-    (transposed_times(&s.unit_from_scene, normal), rho)
+    (s.unit_space.scene_normal(normal), rho)
 }
 
 impl<L: SimdFloat> AnalyticPrimitive<L> for ConicalFrustum<L::Scalar> {
@@ -330,7 +311,7 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for ConicalFrustum<L::Scalar> {
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let s = self;
-        let p = times(&s.unit_from_scene, point - Vec3::splat(s.center));
+        let p = s.unit_space.point(point);
         let (side, rho) = side_normal(s, p.x, p.y);
         let steepness = L::one() / side.length_squared().sqrt();
         let radius = L::splat(s.slope).mul_add(p.z, L::splat(s.mid_radius));
@@ -358,7 +339,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for ConicalFrustum<L::Scalar> {
         let (enter, leave) = chord.distances();
         let cap = Vec3::splat(s.cap_normal).dot(ray.direction).abs();
         let cosine = |on_side: L::Mask, t: L| {
-            let end_point = chord.direction.mul_add(t, chord.point);
+            let end_point = chord.line.direction.mul_add(t, chord.line.point);
             let (normal, _) = side_normal(s, end_point.x, end_point.y);
             let side = (normal.dot(ray.direction) / normal.length_squared().sqrt()).abs();
             L::select(on_side, side, cap)

@@ -9,6 +9,7 @@ use crate::primitive::canonical::{
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
 use crate::primitive::sphere::intersections;
+use crate::primitive::unit_space::{UnitSpace, rounded_rows, times};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Image of the unit sphere at the origin under an invertible affine map.
@@ -103,36 +104,16 @@ fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
 /// Ellipsoid compiled for ray intersection. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct Ellipsoid<S> {
-    center: [S; 3],
-    unit_from_scene: [[S; 3]; 3],
+    unit_space: UnitSpace<S>,
     scene_from_unit: [[S; 3]; 3],
     reach: S,
-}
-
-/// Returns the rows of a matrix, rounded to the precision `S`.
-pub fn rounded_rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
-    m.transpose().to_cols_array_2d().map(|row| row.map(S::from_f64))
-}
-
-/// Returns the product of the matrix with the rows `m` and the vector `v`.
-#[inline(always)]
-pub fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
-    Vec3::new(Vec3::splat(m[0]).dot(v), Vec3::splat(m[1]).dot(v), Vec3::splat(m[2]).dot(v))
-}
-
-/// Returns the product of the transpose of the matrix with the rows `m` and the vector `v`. If `m`
-/// is the inverse of a map, this transforms a normal `v` by the map.
-#[inline(always)]
-pub fn transposed_times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
-    Vec3::splat(m[0]) * v.x + Vec3::splat(m[1]) * v.y + Vec3::splat(m[2]) * v.z
 }
 
 impl<S: Float> Ellipsoid<S> {
     pub fn new(form: &EllipsoidForm) -> Self {
         let DAffine3 { matrix3, translation } = form.scene_from_unit;
         Self {
-            center: translation.to_array().map(S::from_f64),
-            unit_from_scene: rounded_rows(matrix3.inverse()),
+            unit_space: UnitSpace::new(translation, matrix3),
             scene_from_unit: rounded_rows(matrix3),
             reach: S::from_f64(form.max_coordinate()),
         }
@@ -143,8 +124,7 @@ impl<S: Float> Ellipsoid<S> {
 /// whose line hits it; `None` if no line hits it.
 #[inline(always)]
 fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
-    let f = times(&e.unit_from_scene, ray.origin - Vec3::splat(e.center));
-    let d = times(&e.unit_from_scene, ray.direction);
+    let Ray { origin: f, direction: d } = e.unit_space.ray(ray);
     let scale = L::one() / d.length_squared().sqrt();
     let (near, far, meets) = intersections(f, d * scale, L::one())?;
     Some((near * scale, far * scale, meets))
@@ -159,11 +139,10 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for Ellipsoid<L::Scalar> {
 
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
-        let center = Vec3::splat(self.center);
-        let on_unit = times(&self.unit_from_scene, point - center).normalize();
+        let on_unit = self.unit_space.point(point).normalize();
         SurfacePoint {
-            point: times(&self.scene_from_unit, on_unit) + center,
-            normal: transposed_times(&self.unit_from_scene, on_unit).normalize(),
+            point: times(&self.scene_from_unit, on_unit) + Vec3::splat(self.unit_space.center),
+            normal: self.unit_space.scene_normal(on_unit).normalize(),
             max_coordinate: L::splat(self.reach),
         }
     }

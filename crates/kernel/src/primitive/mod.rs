@@ -20,6 +20,7 @@ mod plane;
 mod shading_normal;
 mod sphere;
 mod torus;
+mod unit_space;
 
 pub use aggregate::{
     AccelerationStructure, Aggregate, BVH_MIN_PRIMITIVES, PrimitiveId, PrimitiveSet,

@@ -22,7 +22,7 @@ use crate::primitive::canonical::{
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint, TexCoord};
 use crate::primitive::csg::{SolidPrimitive, Span};
-use crate::primitive::ellipsoid::{rounded_rows, times, transposed_times};
+use crate::primitive::unit_space::{UnitLine, UnitSpace, rounded_rows, times};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::TAU;
 
@@ -121,9 +121,8 @@ impl CanonicalShape for TorusForm {
 /// Torus compiled for ray intersection. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct Torus<S> {
-    center: [S; 3],
-    /// Linear map from the scene to the space in which the ring has radius 1.
-    unit_from_scene: [[S; 3]; 3],
+    /// Space in which the ring has radius 1.
+    unit_space: UnitSpace<S>,
     scene_from_unit: [[S; 3]; 3],
     /// Radius of the tube in the space in which the ring has radius 1.
     tube: S,
@@ -135,8 +134,7 @@ impl<S: Float> Torus<S> {
     pub fn new(form: &TorusForm) -> Self {
         let DAffine3 { matrix3, translation } = form.scene_from_unit();
         Self {
-            center: translation.to_array().map(S::from_f64),
-            unit_from_scene: rounded_rows(matrix3.inverse()),
+            unit_space: UnitSpace::new(translation, matrix3),
             scene_from_unit: rounded_rows(matrix3),
             tube: S::from_f64(form.tube / form.ring),
             inverse_ring: S::from_f64(form.ring.recip()),
@@ -152,19 +150,12 @@ const ROOM: f64 = 64.0;
 /// Largest number of steps of the search for a zero. Bisection needs 54 in double precision.
 const MAX_STEPS: usize = 64;
 
-/// Line of a ray in the space in which the ring has radius 1. A position on the line is a signed
-/// distance from `point`.
+/// Line of a ray in the space in which the ring has radius 1.
 #[derive(Clone, Copy)]
-struct UnitLine<L: SimdFloat> {
-    /// Point of the line closest to the centre.
-    point: Vec3<L>,
-    direction: Vec3<L>,
+struct TorusLine<L: SimdFloat> {
+    unit: UnitLine<L>,
     /// Squared length of the part of the direction perpendicular to the axis.
     across2: L,
-    /// Position of the ray's origin.
-    origin: L,
-    /// Length in the scene of a step of length 1 on the line.
-    scale: L,
     tube: L,
     /// Position at which the line enters the region of the torus.
     low: L,
@@ -194,19 +185,12 @@ struct Separators<L: SimdFloat> {
     inside: [L::Mask; 5],
 }
 
-impl<L: SimdFloat> UnitLine<L> {
+impl<L: SimdFloat> TorusLine<L> {
     /// Prepares the line of each ray. Returns `None` if no line crosses the region of the torus.
     #[inline(always)]
     fn new(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<Self> {
-        let f = times(&torus.unit_from_scene, ray.origin - Vec3::splat(torus.center));
-        let d = times(&torus.unit_from_scene, ray.direction);
-        let scale = L::one() / d.length_squared().sqrt();
-        let d = d * scale;
-        // The second step removes the rounding error of the first step along the direction.
-        let back = -f.dot(d);
-        let p = d.mul_add(back, f);
-        let again = -p.dot(d);
-        let p = d.mul_add(again, p);
+        let unit = torus.unit_space.line(ray);
+        let UnitLine { point: p, direction: d, .. } = unit;
         let tube = L::splat(torus.tube);
         let room = L::from_f64(ROOM * L::EPSILON);
         let reach = L::one() + tube + room;
@@ -224,26 +208,18 @@ impl<L: SimdFloat> UnitLine<L> {
         if near.none() {
             return None;
         }
-        Some(Self {
-            point: p,
-            direction: d,
-            across2: d.x.mul_add(d.x, d.z * d.z),
-            origin: -(back + again),
-            scale,
-            tube,
-            low,
-            high,
-            near,
-        })
+        let across2 = d.x.mul_add(d.x, d.z * d.z);
+        Some(Self { unit, across2, tube, low, high, near })
     }
 
     #[inline(always)]
     fn place(&self, s: L) -> Place<L> {
-        let p = self.direction.mul_add(s, self.point);
+        let UnitLine { point, direction: d, .. } = self.unit;
+        let p = d.mul_add(s, point);
         let rho = p.x.mul_add(p.x, p.z * p.z).sqrt();
         let inward = L::one() / rho.max(L::from_f64(1e-30));
         let limit = self.across2.sqrt();
-        let speed = p.x.mul_add(self.direction.x, p.z * self.direction.z) * inward;
+        let speed = p.x.mul_add(d.x, p.z * d.z) * inward;
         Place { beyond: rho - L::one(), y: p.y, speed: speed.max(-limit).min(limit), inward }
     }
 
@@ -252,7 +228,7 @@ impl<L: SimdFloat> UnitLine<L> {
     fn height(&self, s: L) -> (L, L) {
         let Place { beyond, y, speed, .. } = self.place(s);
         let height = beyond.mul_add(beyond, (y - self.tube) * (y + self.tube));
-        let slope = beyond.mul_add(speed, y * self.direction.y);
+        let slope = beyond.mul_add(speed, y * self.unit.direction.y);
         (height, slope + slope)
     }
 
@@ -260,7 +236,7 @@ impl<L: SimdFloat> UnitLine<L> {
     #[inline(always)]
     fn slope(&self, s: L) -> (L, L) {
         let Place { beyond, y, speed, inward } = self.place(s);
-        let slope = beyond.mul_add(speed, y * self.direction.y);
+        let slope = beyond.mul_add(speed, y * self.unit.direction.y);
         (slope, L::one() - (self.across2 - speed * speed) * inward)
     }
 
@@ -277,7 +253,7 @@ impl<L: SimdFloat> UnitLine<L> {
         let tiny = L::from_f64(1e-30);
         let a2 = self.across2.max(tiny);
         let a = a2.sqrt();
-        let (p, d) = (self.point, self.direction);
+        let UnitLine { point: p, direction: d, .. } = self.unit;
         // Point nearest to the axis, and its distance from the axis.
         let middle = -(p.x.mul_add(d.x, p.z * d.z)) / a2;
         let least = (p.x.mul_add(d.z, -(p.z * d.x)) / a).abs();
@@ -369,19 +345,19 @@ impl<L: SimdFloat> UnitLine<L> {
 
     #[inline(always)]
     fn distance(&self, s: L) -> L {
-        (s - self.origin) * self.scale
+        (s - self.unit.start) * self.unit.scale
     }
 }
 
 impl<L: SimdFloat> AnalyticPrimitive<L> for Torus<L::Scalar> {
     #[inline(never)]
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
-        let line = UnitLine::new(self, ray)?;
-        let ahead = line.near & line.origin.lt(line.high);
+        let line = TorusLine::new(self, ray)?;
+        let ahead = line.near & line.unit.start.lt(line.high);
         if ahead.none() {
             return None;
         }
-        let Separators { places, inside } = line.separators(line.origin);
+        let Separators { places, inside } = line.separators(line.unit.start);
         // The first bracket that has one end inside the torus and the other end outside.
         let (mut low, mut high, mut sign) = (places[0], places[4], L::one());
         let mut open = ahead;
@@ -397,14 +373,13 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for Torus<L::Scalar> {
         if hits.none() {
             return None;
         }
-        let root = line.root(low, high, sign, hits, UnitLine::height);
+        let root = line.root(low, high, sign, hits, TorusLine::height);
         Some((line.distance(root), hits))
     }
 
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
-        let center = Vec3::splat(self.center);
-        let p = times(&self.unit_from_scene, point - center);
+        let p = self.unit_space.point(point);
         let rho = p.x.mul_add(p.x, p.z * p.z).sqrt();
         let on_axis = rho.le(L::zero());
         let inverse = L::one() / L::select(on_axis, L::one(), rho);
@@ -412,14 +387,14 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for Torus<L::Scalar> {
         let outward = (p - ring).normalize();
         let on_surface = outward.mul_add(L::splat(self.tube), ring);
         SurfacePoint {
-            point: times(&self.scene_from_unit, on_surface) + center,
-            normal: transposed_times(&self.unit_from_scene, outward).normalize(),
+            point: times(&self.scene_from_unit, on_surface) + Vec3::splat(self.unit_space.center),
+            normal: self.unit_space.scene_normal(outward).normalize(),
             max_coordinate: L::splat(self.reach),
         }
     }
 
     fn uv(&self, point: Vec3<L>) -> Option<TexCoord<L>> {
-        let p = times(&self.unit_from_scene, point - Vec3::splat(self.center));
+        let p = self.unit_space.point(point);
         let rho2 = p.x.mul_add(p.x, p.z * p.z).max(L::from_f64(1e-12));
         let rho = rho2.sqrt();
         let beyond = rho - L::one();
@@ -449,7 +424,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for Torus<L::Scalar> {
 /// Returns the spans of each line; the second one or both may be empty.
 #[inline(never)]
 fn spans<L: SimdFloat>(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<[Span<L>; 2]> {
-    let line = UnitLine::new(torus, ray)?;
+    let line = TorusLine::new(torus, ray)?;
     let Separators { places, inside } = line.separators(line.low);
     let near = line.near;
     let one = L::one();
@@ -459,7 +434,7 @@ fn spans<L: SimdFloat>(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<[Span<L
         if open.none() {
             return places[i];
         }
-        line.root(places[i], places[i + 1], sign, open, UnitLine::height)
+        line.root(places[i], places[i + 1], sign, open, TorusLine::height)
     };
     let enter_first = root(0, -one, first);
     let leave_first = root(1, one, first.and_not(whole));

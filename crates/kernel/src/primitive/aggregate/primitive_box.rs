@@ -5,6 +5,7 @@ use crate::bvh::Ray;
 use crate::bvh::packet::SlabPacket;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::canonical::{Bounds, CanonicalShape, rows};
+use crate::primitive::unit_space::UnitSpace;
 use glam::DVec3;
 
 /// Bounding box of one primitive.
@@ -15,13 +16,11 @@ pub struct PrimitiveBox<S> {
     space: Option<BoxFrame<S>>,
 }
 
-/// Object space of an oriented bounding box. A point p of the scene has the coordinates `rows (p -
-/// center)` in this space.
+/// Object space of an oriented bounding box, whose origin is the centre of the box.
 struct BoxFrame<S> {
-    center: [S; 3],
-    rows: [[S; 3]; 3],
-    /// Sum of the magnitudes in each row: the largest factor by which the map to object space
-    /// enlarges rounding errors along the axis of the row.
+    unit_space: UnitSpace<S>,
+    /// Sum of the magnitudes in each row of the map to object space: the largest factor by which
+    /// this map enlarges rounding errors along the axis of the row.
     growth: [S; 3],
     /// Largest magnitude of a coordinate of the primitive in the scene.
     reach: S,
@@ -54,12 +53,12 @@ impl<S: Float> PrimitiveBox<S> {
         let Some((scene_from_own, (low, high))) = form.oriented_box().filter(|_| oriented) else {
             return Some(made(bounds, None));
         };
-        let rows = rows(&scene_from_own.matrix3.inverse());
         let middle = 0.5 * (low + high);
+        let center = scene_from_own.transform_point3(middle);
         let space = BoxFrame {
-            center: vector(scene_from_own.transform_point3(middle)),
-            rows: rows.map(vector),
-            growth: rows.map(|r| S::from_f64(r.abs().element_sum())),
+            unit_space: UnitSpace::new(center, scene_from_own.matrix3),
+            growth: rows(&scene_from_own.matrix3.inverse())
+                .map(|r| S::from_f64(r.abs().element_sum())),
             reach: S::from_f64(bounds.0.abs().max(bounds.1.abs()).max_element()),
         };
         Some(made((low - middle, high - middle), Some(space)))
@@ -78,14 +77,7 @@ impl<S: Float> PrimitiveBox<S> {
                 // Bound of the rounding errors of the ray's origin, of its direction and of the
                 // box's centre, in scene units.
                 let lost = (far + L::splat(space.reach)) * L::from_f64(64.0 * L::EPSILON);
-                let rows = space.rows.map(Vec3::splat);
-                let transform =
-                    |v: Vec3<L>| Vec3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));
-                let inner = Ray {
-                    origin: transform(ray.origin - Vec3::splat(space.center)),
-                    direction: transform(ray.direction),
-                };
-                SlabPacket::new(&inner, Vec3::splat(space.growth) * lost)
+                SlabPacket::new(&space.unit_space.ray(ray), Vec3::splat(space.growth) * lost)
             }
         };
         packet.enters(Vec3::splat(self.low), Vec3::splat(self.high), limit)

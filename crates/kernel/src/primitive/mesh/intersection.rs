@@ -232,13 +232,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         });
         let t = L::from_fn(|i| found[i].0);
         let t = if ANY { L::select(t.lt(limit), L::from_f64(-1.0), limit) } else { t };
-        let mut triangle = L::from_id(0);
-        let lanes = L::from_fn(|i| L::Scalar::from_f64(i as f64));
-        for (lane, (_, number)) in found.iter().enumerate().take(L::WIDTH) {
-            let lane_mask = lanes.le(L::from_f64(lane as f64)) & lanes.ge(L::from_f64(lane as f64));
-            triangle = L::select(lane_mask, L::from_id(*number), triangle);
-        }
-        TriangleHit { t, triangle }
+        TriangleHit { t, triangle: L::from_fn(|i| L::from_id(found[i].1).lane(i)) }
     }
 }
 
