@@ -56,6 +56,17 @@ pub enum ReflectionLobe<S> {
     Microfacet(MicrofacetDistribution<S>),
 }
 
+impl<S> ReflectionLobe<S> {
+    /// Returns the microfacets of the lobe; `None` for lobes without microfacets.
+    #[inline(always)]
+    pub(super) fn facets(&self) -> Option<&MicrofacetDistribution<S>> {
+        match self {
+            Self::Microfacet(facets) => Some(facets),
+            Self::Mirror | Self::Cone { .. } | Self::Square { .. } => None,
+        }
+    }
+}
+
 /// Transmission of light through a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Transmission<S> {
@@ -320,16 +331,10 @@ impl<S: Float> Bsdf<S> {
         uv: (L, L),
     ) -> BsdfSample<L> {
         let BsdfQuery { incident, normal: n, fold } = *query;
-        let mirror = incident.reflect(n);
-        let direction = match &self.lobe {
-            ReflectionLobe::Mirror => mirror,
-            ReflectionLobe::Cone { .. } | ReflectionLobe::Square { .. } => {
-                spread(&self.lobe, mirror, uv)
-            }
-            ReflectionLobe::Microfacet(facets) => {
-                return self.sample_microfacet(facets, query, uv);
-            }
-        };
+        if let Some(facets) = self.lobe.facets() {
+            return self.sample_microfacet(facets, query, uv);
+        }
+        let direction = spread(&self.lobe, incident.reflect(n), uv);
         let weight = self.strength();
         let up = direction.dot(n);
         let below = up.le(L::zero());
@@ -373,15 +378,10 @@ impl<S: Float> Bsdf<S> {
     #[inline(always)]
     pub fn pdf<L: SimdFloat<Scalar = S>>(&self, query: &BsdfQuery<L>, direction: Vec3<L>) -> L {
         let density = self.unfolded_pdf(query, direction);
-        match &self.lobe {
-            ReflectionLobe::Cone { .. } | ReflectionLobe::Square { .. } if query.fold => {
-                density + self.unfolded_pdf(query, direction.reflect(query.normal))
-            }
-            ReflectionLobe::Mirror
-            | ReflectionLobe::Cone { .. }
-            | ReflectionLobe::Square { .. }
-            | ReflectionLobe::Microfacet(_) => density,
+        if !query.fold || self.lobe.facets().is_some() {
+            return density;
         }
+        density + self.unfolded_pdf(query, direction.reflect(query.normal))
     }
 
     /// Returns the density [1/sr] before directions below the surface are mirrored.
@@ -429,10 +429,9 @@ impl<S: Float> Bsdf<S> {
         let above = nl.gt(L::zero());
         let h = direction - incident;
         let k = self.strength::<L>();
-        let value = match &self.lobe {
-            ReflectionLobe::Mirror => L::zero(),
-            ReflectionLobe::Cone { .. } | ReflectionLobe::Square { .. } => k * density,
-            ReflectionLobe::Microfacet(facets) => {
+        let value = match self.lobe.facets() {
+            None => k * density,
+            Some(facets) => {
                 let nv = -incident.dot(n);
                 let (nh, tan2) = along_tan2(h, n);
                 let (visible, total) =

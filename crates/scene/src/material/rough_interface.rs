@@ -78,11 +78,9 @@ impl<S: Float> Bsdf<S> {
         query: &InterfaceQuery<L>,
         uv: (L, L),
     ) -> InterfaceSample<L> {
-        match &self.lobe {
-            ReflectionLobe::Microfacet(facets) => self.sample_facet_interface(facets, query, uv),
-            ReflectionLobe::Mirror
-            | ReflectionLobe::Cone { .. }
-            | ReflectionLobe::Square { .. } => self.sample_spread_interface(query, uv),
+        match self.lobe.facets() {
+            Some(facets) => self.sample_facet_interface(facets, query, uv),
+            None => self.sample_spread_interface(query, uv),
         }
     }
 
@@ -196,13 +194,9 @@ impl<S: Float> Bsdf<S> {
         direction: Vec3<L>,
         behind: L::Mask,
     ) -> BsdfValue<L> {
-        match &self.lobe {
-            ReflectionLobe::Microfacet(facets) => {
-                self.eval_facet_interface(facets, query, direction, behind)
-            }
-            ReflectionLobe::Mirror
-            | ReflectionLobe::Cone { .. }
-            | ReflectionLobe::Square { .. } => self.eval_spread_interface(query, direction, behind),
+        match self.lobe.facets() {
+            Some(facets) => self.eval_facet_interface(facets, query, direction, behind),
+            None => self.eval_spread_interface(query, direction, behind),
         }
     }
 
