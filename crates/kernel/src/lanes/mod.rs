@@ -314,6 +314,12 @@ pub fn distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> impl Iterator<Item = (u3
     })
 }
 
+/// Returns the polynomial `k[0] + k[1] x + k[2] x^2 + ...`.
+#[inline(always)]
+pub fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
+    k.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::from_f64(*k)))
+}
+
 /// Constant 1.5 x 2^52. Adding it to a double with a magnitude below 2^51 rounds the double to an
 /// integer: the difference between the bits of the sum and the bits of the constant.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;

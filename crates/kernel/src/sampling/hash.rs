@@ -24,32 +24,3 @@ pub fn hash_words(words: &[u32]) -> u32 {
         hash_scalar(h.rotate_left(5).wrapping_add(0x85eb_ca6b) ^ hash_scalar(*w))
     })
 }
-
-/// Applies Owen scrambling to binary fractions whose first digit is in bit 0. Whether a digit is
-/// flipped depends on `seed` and on all preceding digits.
-///
-/// Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
-#[inline(always)]
-pub fn owen<B: SimdU32>(x: B, seed: B) -> B {
-    owen_scramble_suffix(owen_scramble_prefix(x), seed, owen_factor(seed))
-}
-
-/// Computes the first part of [`owen`], which does not depend on the seed.
-#[inline(always)]
-pub fn owen_scramble_prefix<B: SimdU32>(x: B) -> B {
-    x ^ (x * B::splat(0x3d20_adea))
-}
-
-/// Returns the odd factor of the multiplication in [`owen`].
-#[inline(always)]
-pub fn owen_factor<B: SimdU32>(seed: B) -> B {
-    (seed >> 16) | B::splat(1)
-}
-
-/// Computes the second part of [`owen`].
-#[inline(always)]
-pub fn owen_scramble_suffix<B: SimdU32>(prefix: B, seed: B, factor: B) -> B {
-    let x = (prefix + seed) * factor;
-    let x = x ^ (x * B::splat(0x0552_6c56));
-    x ^ (x * B::splat(0x53a2_2864))
-}

@@ -1,11 +1,10 @@
 //! Packet sampler: the random numbers of the samples in the lanes of a packet.
 
 use crate::lanes::{MAX_WIDTH, SimdFloat, SimdU32, array_from_fn};
-use crate::sampling::hash::{
-    hash, hash_scalar, hash_words, owen, owen_factor, owen_scramble_prefix, owen_scramble_suffix,
+use crate::sampling::hash::{hash, hash_scalar, hash_words};
+use crate::sampling::sobol::{
+    self, DIMENSIONS, owen, owen_factor, owen_scramble_prefix, owen_scramble_suffix,
 };
-use crate::sampling::sobol;
-use crate::sampling::sobol::DIMENSIONS;
 
 /// Kind of the random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,6 @@
-//! Sobol points in eight dimensions with a 32-bit index. The dimensions form four pairs. Each pair
-//! consists of the first two dimensions of the Sobol sequence, a (0, 2)-sequence in base 2.
+//! Sobol points in eight dimensions with a 32-bit index, and their Owen scrambling. The dimensions
+//! form four pairs. Each pair consists of the first two dimensions of the Sobol sequence, a (0,
+//! 2)-sequence in base 2.
 //!
 //! Pair k has the points of this (0, 2)-sequence in an order of its own: point i of the pair is
 //! point `M_k i` of the sequence. Here i is a vector of bits, and `M_k` is an upper triangular
@@ -17,6 +18,7 @@
 //!
 //! Values are stored with the first binary digit in bit 0, as the scrambling hash requires.
 
+use crate::lanes::SimdU32;
 use crate::sampling::hash::hash_scalar;
 
 /// Number of dimensions of the Sobol points.
@@ -109,6 +111,35 @@ pub fn point(dimension: usize, index: u32) -> u32 {
     x
 }
 
+/// Applies Owen scrambling to binary fractions whose first digit is in bit 0. Whether a digit is
+/// flipped depends on `seed` and on all preceding digits.
+///
+/// Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
+#[inline(always)]
+pub fn owen<B: SimdU32>(x: B, seed: B) -> B {
+    owen_scramble_suffix(owen_scramble_prefix(x), seed, owen_factor(seed))
+}
+
+/// Computes the first part of [`owen`], which does not depend on the seed.
+#[inline(always)]
+pub fn owen_scramble_prefix<B: SimdU32>(x: B) -> B {
+    x ^ (x * B::splat(0x3d20_adea))
+}
+
+/// Returns the odd factor of the multiplication in [`owen`].
+#[inline(always)]
+pub fn owen_factor<B: SimdU32>(seed: B) -> B {
+    (seed >> 16) | B::splat(1)
+}
+
+/// Computes the second part of [`owen`].
+#[inline(always)]
+pub fn owen_scramble_suffix<B: SimdU32>(prefix: B, seed: B, factor: B) -> B {
+    let x = (prefix + seed) * factor;
+    let x = x ^ (x * B::splat(0x0552_6c56));
+    x ^ (x * B::splat(0x53a2_2864))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -157,8 +188,7 @@ mod tests {
     /// "the lobe" the usual Sobol points have the ratios 0.30 (64 points) and 0.23 (256 points).
     #[test]
     fn scrambled_points_estimate_half_spaces_better_than_random_points() {
-        use crate::lanes::{SimdFloat, SimdU32};
-        use crate::sampling::hash::owen;
+        use crate::lanes::SimdFloat;
         type One = f32;
         let unit = |bits: u32| f64::from(bits) / 4_294_967_296.0;
         let mut state = 1;

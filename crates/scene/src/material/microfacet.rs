@@ -1,10 +1,10 @@
 //! Microfacet distributions, Beckmann and GGX, and their masking by V-cavities or by Smith's model.
-//! The maps from the unit square to visible normals are in `sampling/warp.rs`.
+//! `visible_normals.rs` samples them.
 
 use crate::material::Masking;
+use crate::material::visible_normals::{beckmann_visible, ggx_visible, ggx_visible_v_cavity};
 use std::f64::consts::{FRAC_1_PI, PI};
-use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
-use zerkalo_kernel::sampling::warp;
+use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, polynomial};
 
 /// Smallest alpha of a microfacet distribution. A reflection lobe of smaller alpha is treated as a
 /// mirror. Highlights of smaller alpha are computed with this value.
@@ -58,10 +58,9 @@ fn beckmann_lambda<L: SimdFloat>(a: L) -> L {
         -2.270_107_819_080_595_3e-5,
     ];
     let x = L::from_f64(2.0) - L::from_f64(6.0) / (a + L::from_f64(2.0));
-    let k = K.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::from_f64(*k)));
     let a2 = a * a;
     let below = a * a2.mul_add(L::from_f64(4.0 * PI.sqrt()), L::from_f64(2.0 * PI.sqrt()));
-    (-a2).exp() * k / below
+    (-a2).exp() * polynomial(&K, x) / below
 }
 
 impl<S: Float> MicrofacetDistribution<S> {
@@ -83,11 +82,9 @@ impl<S: Float> MicrofacetDistribution<S> {
     ) -> Vec3<L> {
         let alpha = L::splat(self.alpha);
         match (self.normals, self.masking) {
-            (FacetNormals::Ggx, Masking::VCavity) => warp::ggx_visible_v_cavity(u, v, alpha, view),
-            (FacetNormals::Ggx, Masking::Smith) => warp::ggx_visible(u, v, alpha, view),
-            (FacetNormals::Beckmann, masking) => {
-                warp::beckmann_visible(u, v, alpha, view, masking == Masking::VCavity)
-            }
+            (FacetNormals::Ggx, Masking::VCavity) => ggx_visible_v_cavity(u, v, alpha, view),
+            (FacetNormals::Ggx, Masking::Smith) => ggx_visible(u, v, alpha, view),
+            (FacetNormals::Beckmann, masking) => beckmann_visible(u, v, alpha, view, masking),
         }
     }
 

@@ -10,6 +10,7 @@ mod refraction;
 mod rough_interface;
 mod texture;
 mod texture_eval;
+mod visible_normals;
 
 pub use bsdf::{
     Bsdf, BsdfQuery, BsdfSample, BsdfValue, ReflectionLobe, SpecularModel, Transmission,
