@@ -280,15 +280,20 @@ impl<S: Float> CompiledLights<S> {
     fn bounds(&self) -> LightBounds {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let target_of = |source: &DeltaSource<S>| match &source.light.light {
-            DeltaLight::Point { position, .. } => LightTarget::Point(vector(position)),
+            DeltaLight::Point { position, .. } => LightTarget::point(vector(position)),
             DeltaLight::Directional { wi } => LightTarget::Direction(vector(wi)),
         };
         let on_surfaces = self.delta_lights.iter().filter_map(|s| s.light.on_surface.as_ref());
         LightBounds {
             delta_lights: self.delta_lights.iter().map(target_of).collect(),
             max_end_offset: on_surfaces.map(OnSurface::farthest).fold(0.0, f64::max),
-            emitters: self.emitters.balls().collect(),
-            strata: self.choice.iter().flat_map(LightChoice::balls).collect(),
+            emitters: self.emitters.balls().map(LightTarget::Ball).collect(),
+            strata: self
+                .choice
+                .iter()
+                .flat_map(LightChoice::balls)
+                .map(LightTarget::Ball)
+                .collect(),
         }
     }
 }

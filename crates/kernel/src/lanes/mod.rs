@@ -22,9 +22,7 @@ mod vector;
 pub use vec3::{Frame, Vec3};
 
 use std::fmt::Debug;
-use std::ops::{
-    Add, AddAssign, BitAnd, BitOr, BitXor, Div, Mul, MulAssign, Neg, Not, Shl, Shr, Sub, SubAssign,
-};
+use std::ops::{Add, AddAssign, BitAnd, BitOr, BitXor, Div, Mul, MulAssign, Neg, Not, Sub};
 
 /// Single-precision SIMD vector that the renderer uses.
 #[cfg(not(target_feature = "avx512f"))]
@@ -93,7 +91,7 @@ float!(f64);
 
 /// Implements methods of SIMD traits by inherent methods of `$type`.
 macro_rules! by_own_methods {
-    ($type:ident: $($name:ident = $own:ident($($argument:ident),*) -> $result:ty),+ $(,)?) => {$(
+    ($type:ty: $($name:ident = $own:ident($($argument:ident),*) -> $result:ty),+ $(,)?) => {$(
         #[inline(always)]
         fn $name(self, $($argument: Self),*) -> $result {
             <$type>::$own(self, $($argument),*)
@@ -116,7 +114,10 @@ pub trait Mask:
     /// Returns lane `i` as bit `i`.
     fn bits(self) -> u32;
     /// Returns `true` if every lane is true.
-    fn all(self) -> bool;
+    #[inline(always)]
+    fn all(self) -> bool {
+        (!self).none()
+    }
     /// Returns `true` if at least one lane is true.
     #[inline(always)]
     fn any(self) -> bool {
@@ -150,8 +151,6 @@ pub trait SimdU32:
     + BitXor<Output = Self>
     + BitAnd<Output = Self>
     + BitOr<Output = Self>
-    + Shl<u32, Output = Self>
-    + Shr<u32, Output = Self>
     + 'static
 {
     /// Returns `x` in every lane.
@@ -160,6 +159,8 @@ pub trait SimdU32:
     fn from_fn(f: impl FnMut(usize) -> u32) -> Self;
     /// Returns lane `i`.
     fn lane(self, i: usize) -> u32;
+    /// Shifts the bits of each lane to the right by `n`.
+    fn shift_right(self, n: u32) -> Self;
     /// Reverses the order of the bits in each lane.
     fn reverse(self) -> Self;
 }
@@ -176,7 +177,6 @@ pub trait SimdFloat:
     + Div<Output = Self>
     + Neg<Output = Self>
     + AddAssign
-    + SubAssign
     + MulAssign
     + 'static
 {

@@ -2,60 +2,16 @@
 //! order as with several lanes, so that results have identical bits.
 
 use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, by_own_methods, round_i64};
+use std::num::Wrapping;
 
 impl Mask for bool {
-    #[inline(always)]
-    fn all(self) -> bool {
-        self
-    }
     #[inline(always)]
     fn bits(self) -> u32 {
         u32::from(self)
     }
 }
 
-/// Integer vector of one lane: a `u32` with wrapping arithmetic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct One(u32);
-
-macro_rules! one_op {
-    ($($trait:ident $name:ident |$a:ident, $b:ident| $result:expr),*) => {$(
-        impl std::ops::$trait for One {
-            type Output = Self;
-            #[inline(always)]
-            fn $name(self, other: Self) -> Self {
-                let ($a, $b) = (self.0, other.0);
-                Self($result)
-            }
-        }
-    )*};
-}
-
-one_op!(
-    Add add |a, b| u32::wrapping_add(a, b),
-    Mul mul |a, b| u32::wrapping_mul(a, b),
-    BitXor bitxor |a, b| a ^ b,
-    BitAnd bitand |a, b| a & b,
-    BitOr bitor |a, b| a | b
-);
-
-impl std::ops::Shl<u32> for One {
-    type Output = Self;
-    #[inline(always)]
-    fn shl(self, n: u32) -> Self {
-        Self(self.0 << n)
-    }
-}
-
-impl std::ops::Shr<u32> for One {
-    type Output = Self;
-    #[inline(always)]
-    fn shr(self, n: u32) -> Self {
-        Self(self.0 >> n)
-    }
-}
-
-impl SimdU32 for One {
+impl SimdU32 for Wrapping<u32> {
     #[inline(always)]
     fn splat(x: u32) -> Self {
         Self(x)
@@ -69,9 +25,10 @@ impl SimdU32 for One {
         self.0
     }
     #[inline(always)]
-    fn reverse(self) -> Self {
-        Self(self.0.reverse_bits())
+    fn shift_right(self, n: u32) -> Self {
+        Self(self.0 >> n)
     }
+    by_own_methods! { Wrapping<u32>: reverse = reverse_bits() -> Self }
 }
 
 macro_rules! scalar_lanes {
@@ -82,7 +39,7 @@ macro_rules! scalar_lanes {
             const MAX: f64 = $float::MAX as f64;
             type Scalar = $float;
             type Mask = bool;
-            type SimdU32 = One;
+            type SimdU32 = Wrapping<u32>;
 
             #[inline(always)]
             fn splat(x: $float) -> Self {
@@ -156,7 +113,7 @@ macro_rules! scalar_lanes {
                 self.id_lane(0) == id
             }
             #[inline(always)]
-            fn to_unit(bits: One) -> Self {
+            fn to_unit(bits: Wrapping<u32>) -> Self {
                 let unit: fn(u32) -> $float = $unit;
                 unit(bits.0)
             }

@@ -1,6 +1,7 @@
 //! Implementations of the SIMD traits with several lanes, based on the types of the `wide` crate.
 
 use crate::lanes::{MAX_WIDTH, Mask, ROUNDER, SimdFloat, SimdU32, array_from_fn, by_own_methods};
+use std::ops::Shl;
 use wide::bytemuck::cast;
 use wide::{f32x4, f32x8, f64x2, f64x4, i32x4, i32x8, i64x4, u32x4, u32x8};
 #[cfg(target_feature = "avx512f")]
@@ -22,6 +23,10 @@ macro_rules! vector_bits {
                 self.as_array()[i]
             }
             #[inline(always)]
+            fn shift_right(self, n: u32) -> Self {
+                self >> n
+            }
+            #[inline(always)]
             fn reverse(self) -> Self {
                 let reverse: fn($bits) -> $bits = $reverse;
                 reverse(self)
@@ -32,13 +37,13 @@ macro_rules! vector_bits {
 
 /// Reverses the bits of each 32-bit lane by shifts and masks.
 #[inline(always)]
-fn reverse_by_shifts<B: SimdU32>(x: B) -> B {
-    let swap = |x: B, n: u32, m: u32| ((x >> n) & B::splat(m)) | ((x & B::splat(m)) << n);
+fn reverse_by_shifts<B: SimdU32 + Shl<u32, Output = B>>(x: B) -> B {
+    let swap = |x: B, n: u32, m: u32| (x.shift_right(n) & B::splat(m)) | ((x & B::splat(m)) << n);
     let x = swap(x, 1, 0x5555_5555);
     let x = swap(x, 2, 0x3333_3333);
     let x = swap(x, 4, 0x0f0f_0f0f);
     let x = swap(x, 8, 0x00ff_00ff);
-    (x >> 16) | (x << 16)
+    x.shift_right(16) | (x << 16)
 }
 
 /// Returns a table for byte shuffles: the reversed bits of each 4-bit index, shifted by `SHIFT`.
@@ -108,10 +113,6 @@ macro_rules! vector_lanes {
      $unit:expr $(; $gather:ident)?) => {
         impl Mask for $vector {
             by_own_methods! { $vector: bits = to_bitmask() -> u32 }
-            #[inline(always)]
-            fn all(self) -> bool {
-                $vector::to_bitmask(self) == (1u32 << $n) - 1
-            }
         }
 
         impl SimdFloat for $vector {

@@ -21,10 +21,17 @@ pub struct BoundingSphere {
 /// Target of shadow rays.
 #[derive(Clone, Copy, Debug)]
 pub enum LightTarget {
-    /// Position of a light at a finite distance.
-    Point(DVec3),
+    /// Sphere around a light, or around several, at a finite distance.
+    Ball(BoundingSphere),
     /// Unit vector towards a distant light.
     Direction(DVec3),
+}
+
+impl LightTarget {
+    /// Returns the target for a light without a size.
+    pub fn point(center: DVec3) -> Self {
+        Self::Ball(BoundingSphere { center, radius: 0.0 })
+    }
 }
 
 /// All rays from one point (the apex) through a convex quadrilateral, and from all points of a lens
@@ -221,10 +228,13 @@ impl BoundingVolume {
     }
 
     /// Returns `true` if the object may be between some point of the sphere `lit` and some point of
-    /// the sphere `light`.
-    pub fn may_occlude_ball(&self, lit: &BoundingSphere, light: &BoundingSphere) -> bool {
-        let above = |plane: HalfSpace| {
-            (plane.height(light.center), light.radius + self.ray_error(light.center))
+    /// `light`.
+    pub fn may_occlude(&self, lit: &BoundingSphere, light: &LightTarget) -> bool {
+        let above = |plane: HalfSpace| match light {
+            LightTarget::Ball(light) => {
+                (plane.height(light.center), light.radius + self.ray_error(light.center))
+            }
+            LightTarget::Direction(direction) => (plane.normal.dot(*direction), F32_RAY_ERROR),
         };
         if self.is_beside(lit, above) {
             return false;
@@ -232,28 +242,18 @@ impl BoundingVolume {
         if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
             return true;
         }
-        distance_to_hull(self.ball.center, &grown(light), &grown(lit)) <= grown(&self.ball).radius
-    }
-
-    /// Returns `true` if the object may be between some point of the sphere `lit` and the light
-    /// `towards`.
-    pub fn may_occlude(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
-        let direction = match towards {
-            LightTarget::Point(light) => {
-                return self.may_occlude_ball(lit, &BoundingSphere { center: *light, radius: 0.0 });
+        match light {
+            LightTarget::Ball(light) => {
+                let distance = distance_to_hull(self.ball.center, &grown(light), &grown(lit));
+                distance <= grown(&self.ball).radius
             }
-            LightTarget::Direction(direction) => *direction,
-        };
-        if self.is_beside(lit, |plane| (plane.normal.dot(direction), F32_RAY_ERROR)) {
-            return false;
+            LightTarget::Direction(direction) => {
+                let (along, across) = along_and_across(self.ball.center - lit.center, *direction);
+                let radius = grown(lit).radius + self.ball.radius;
+                let both = radius * (1.0 + F32_RAY_ERROR) + ray_error(self.ball.center);
+                across <= both && along >= -both
+            }
         }
-        if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
-            return true;
-        }
-        let (along, across) = along_and_across(self.ball.center - lit.center, direction);
-        let radius = grown(lit).radius + self.ball.radius;
-        let both = radius * (1.0 + F32_RAY_ERROR) + ray_error(self.ball.center);
-        across <= both && along >= -both
     }
 }
 
@@ -361,7 +361,7 @@ mod tests {
                 assert!(distance <= to_ball + 1e-12, "{a:?} {b:?} {occluder:?} {s}");
             }
             let bound = BoundingVolume::new(&ball_form(&occluder));
-            apart += u32::from(!bound.may_occlude_ball(&b, &a));
+            apart += u32::from(!bound.may_occlude(&b, &LightTarget::Ball(a)));
         }
         assert!((500..1900).contains(&apart), "{apart}");
     }
@@ -373,7 +373,7 @@ mod tests {
     #[test]
     fn only_what_is_between_shades() {
         let lit = BoundingSphere { center: DVec3::ZERO, radius: 0.5 };
-        let lamp = LightTarget::Point(DVec3::Y * 4.0);
+        let lamp = LightTarget::point(DVec3::Y * 4.0);
         let sun = LightTarget::Direction(DVec3::Y);
         for (form, by_lamp, by_sun) in [
             (ball([0.0, 2.0, 0.0], 0.1), true, true),

@@ -98,11 +98,6 @@ impl Proxy {
 
 /// Geometry of one kind of primitive, in double precision and scene coordinates.
 pub trait CanonicalShape {
-    /// Returns the number of parts that can have a material of their own.
-    fn parts(&self) -> usize {
-        1
-    }
-
     /// Returns the axis-parallel bounding box, the smallest one except for compounds; `None` if the
     /// geometry has no finite bounds.
     fn bounds(&self) -> Option<Bounds>;

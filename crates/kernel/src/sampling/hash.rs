@@ -6,9 +6,9 @@ use crate::lanes::SimdU32;
 /// Hash Functions*, `lowbias32`).
 #[inline(always)]
 pub fn hash<B: SimdU32>(x: B) -> B {
-    let x = (x ^ (x >> 16)) * B::splat(0x7feb_352d);
-    let x = (x ^ (x >> 15)) * B::splat(0x846c_a68b);
-    x ^ (x >> 16)
+    let x = (x ^ x.shift_right(16)) * B::splat(0x7feb_352d);
+    let x = (x ^ x.shift_right(15)) * B::splat(0x846c_a68b);
+    x ^ x.shift_right(16)
 }
 
 /// Hashes a single 32-bit word as [`hash`] does.

@@ -129,7 +129,7 @@ pub fn owen_scramble_prefix<B: SimdU32>(x: B) -> B {
 /// Returns the odd factor of the multiplication in [`owen`].
 #[inline(always)]
 pub fn owen_factor<B: SimdU32>(seed: B) -> B {
-    (seed >> 16) | B::splat(1)
+    seed.shift_right(16) | B::splat(1)
 }
 
 /// Computes the second part of [`owen`].

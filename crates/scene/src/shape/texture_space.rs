@@ -140,7 +140,7 @@ mod tests {
             ]",
         );
         let spaces = compound.texture_spaces();
-        assert_eq!(spaces.len(), compound.form().parts());
+        assert_eq!(spaces.len(), compound.part_materials("").len());
         let kinds: Vec<_> = spaces.iter().map(|s| s.default_mapping).collect();
         assert_eq!(kinds, [Projection::Spherical, Projection::Box, Projection::Cylindrical]);
         let corner = spaces[1].shape_from_texture.transform_point3(DVec3::ONE);

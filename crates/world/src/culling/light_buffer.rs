@@ -80,7 +80,7 @@ impl<S: Float> LightBuffer<S> {
     /// out of most cells that they overlap, so that too many shadow rays would traverse the BVH.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let light = match target {
-            LightTarget::Point(light) => *light,
+            LightTarget::Ball(light) => light.center,
             LightTarget::Direction(_) => DVec3::ZERO,
         };
         let coordinates =
@@ -93,7 +93,7 @@ impl<S: Float> LightBuffer<S> {
         };
         let balls: Vec<BoundingSphere> = occluders.iter().map(relative_to_light).collect();
         let near_depth = |ball: &BoundingSphere| match target {
-            LightTarget::Point(_) => ball.center.length() - ball.radius,
+            LightTarget::Ball(_) => ball.center.length() - ball.radius,
             LightTarget::Direction(direction) => -ball.center.dot(*direction) - ball.radius,
         };
         let near: Vec<f64> = balls.iter().map(near_depth).collect();
@@ -258,8 +258,8 @@ mod tests {
             let origin = Vec3::new(axis(0), axis(1), axis(2));
             let (direction, t_max) = match target {
                 LightTarget::Direction(d) => (Vec3::of(d.to_array()), L::from_f64(L::MAX)),
-                LightTarget::Point(light) => {
-                    let to = Vec3::of(light.to_array()) - origin;
+                LightTarget::Ball(light) => {
+                    let to = Vec3::of(light.center.to_array()) - origin;
                     let distance = to.length_squared().sqrt();
                     (to * (L::one() / distance), distance)
                 }
@@ -287,8 +287,8 @@ mod tests {
     fn light_buffer_shadows_equal_bvh_shadows() {
         let mut random = Random(1);
         let lights = [
-            LightTarget::Point(DVec3::new(1.0, 2.0, -0.5)),
-            LightTarget::Point(DVec3::new(0.0, 19.0, 0.0)),
+            LightTarget::point(DVec3::new(1.0, 2.0, -0.5)),
+            LightTarget::point(DVec3::new(0.0, 19.0, 0.0)),
             LightTarget::Direction(DVec3::new(0.2, -0.9, 0.4).normalize()),
             LightTarget::Direction(DVec3::Z),
         ];
@@ -313,7 +313,7 @@ mod tests {
             |_| BoundingSphere { center: random.point(0.3), radius: 0.05 + 0.2 * random.unit() };
         balls.extend((0..70).map(cluster_ball));
         for target in
-            [LightTarget::Point(DVec3::new(0.0, 4.0, 4.0)), LightTarget::Direction(DVec3::X)]
+            [LightTarget::point(DVec3::new(0.0, 4.0, 4.0)), LightTarget::Direction(DVec3::X)]
         {
             let buffer = LightBuffer::<f32>::new(&target, &occluders(&balls)).expect("a buffer");
             assert!(buffer.cells.iter().any(|cell| cell.complete_to < f32::INFINITY), "{target:?}");
@@ -332,7 +332,7 @@ mod tests {
         ];
         let forms = balls.map(|b| Form::Sphere(SphereForm { center: b.center, radius: b.radius }));
         let geometry = Aggregate::<Single>::with_tree(&forms, true);
-        let target = LightTarget::Point(DVec3::Y * 9.0);
+        let target = LightTarget::point(DVec3::Y * 9.0);
         let buffer = LightBuffer::<f32>::new(&target, &occluders(&balls)).expect("a buffer");
         let ray = Ray { origin: Vec3::<Single>::zero(), direction: Vec3::of([0.0, 1.0, 0.0]) };
         let occluded = |outside| {
@@ -349,7 +349,7 @@ mod tests {
     #[test]
     fn light_buffer_cells_have_few_entries() {
         let mut random = Random(3);
-        let light = LightTarget::Point(DVec3::ZERO);
+        let light = LightTarget::point(DVec3::ZERO);
         let buffer =
             LightBuffer::<f32>::new(&light, &occluders(&balls(&mut random, 400, 0.3))).unwrap();
         let mean = buffer.entries.len() as f64 / buffer.cells.len() as f64;

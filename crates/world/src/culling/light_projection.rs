@@ -109,7 +109,7 @@ impl<S: Float> ProjectedBounds<S> {
     pub fn new(target: &LightTarget, balls: &[BoundingSphere]) -> Self {
         let (projection, rects) = match target {
             LightTarget::Direction(direction) => orthographic(*direction, balls),
-            LightTarget::Point(_) => perspective(balls).unwrap_or_else(|| cube_map(balls)),
+            LightTarget::Ball(_) => perspective(balls).unwrap_or_else(|| cube_map(balls)),
         };
         let finest = if matches!(projection, LightProjection::CubeMap) { 2.0 } else { 4.0 };
         let side = (finest * (balls.len() as f64).sqrt()).clamp(8.0, 128.0) as usize;

@@ -31,8 +31,8 @@ pub(crate) struct LightBounds {
     pub delta_lights: Vec<LightTarget>,
     /// Largest distance between a light without a size and the end point of its shadow rays.
     pub max_end_offset: f64,
-    pub emitters: Vec<BoundingSphere>,
-    pub strata: Vec<BoundingSphere>,
+    pub emitters: Vec<LightTarget>,
+    pub strata: Vec<LightTarget>,
 }
 
 impl TileCandidates {
@@ -154,31 +154,23 @@ impl FrustumCuller {
         };
         let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
         let primary = geometry.select(|primitive| parts[primitive as usize].is_some());
-        // Primitives that can occlude one light from a visible part of some primitive. `occludes`
-        // returns whether a primitive can occlude the light from a visible part.
-        let occluders_of = |occludes: &dyn Fn(&BoundingVolume, &BoundingSphere) -> bool| {
+        // Primitives that can occlude the light from a visible part of some primitive.
+        let occluders_of = |light: &LightTarget| {
             geometry.select(|primitive| {
                 let primitive = primitive as usize;
                 let may_occlude_part = |(other, part): (usize, &Option<BoundingSphere>)| {
                     part.is_some_and(|part| {
                         (other != primitive || self.self_shadowing[primitive])
-                            && occludes(&self.bounds[primitive], &part)
+                            && self.bounds[primitive].may_occlude(&part, light)
                     })
                 };
                 parts.iter().enumerate().any(may_occlude_part)
             })
         };
-        let of_light =
-            |light: &LightTarget| occluders_of(&|bounds, part| bounds.may_occlude(part, light));
-        let of_ball = |light: &BoundingSphere| {
-            occluders_of(&|bounds, part| bounds.may_occlude_ball(part, light))
-        };
         let LightBounds { delta_lights, emitters, strata, .. } = &self.lights;
-        let occluders = Occluders {
-            delta_lights: delta_lights.iter().map(of_light).collect(),
-            emitters: emitters.iter().map(of_ball).collect(),
-            strata: strata.iter().map(of_ball).collect(),
-        };
+        let [delta_lights, emitters, strata] = [delta_lights, emitters, strata]
+            .map(|lights| lights.iter().map(occluders_of).collect());
+        let occluders = Occluders { delta_lights, emitters, strata };
         TileCandidates { primary, occluders }
     }
 }

@@ -198,35 +198,27 @@ impl<S: Float> Stratum<S> {
         let emission = |light: &DeltaSource<S>, channel: usize| {
             light.emission.map_or(S::from_f64(1.0), |emission| emission[channel])
         };
+        let everywhere = SpotCone::of_all_directions();
+        let cone = |light: &DeltaSource<S>| match light.light.light {
+            DeltaLight::Point { cone, .. } => cone,
+            DeltaLight::Directional { .. } => None,
+        };
+        let of_cones = |value: &dyn Fn(&SpotCone<S>) -> S| {
+            let value_of = |light: &_| value(&cone(light).unwrap_or(everywhere));
+            table(value(&everywhere).to_f64(), &value_of)
+        };
+        let cones = lights.iter().find_map(cone).map(|_| Cones {
+            axis: [0, 1, 2].map(|i| of_cones(&move |cone| cone.axis[i])),
+            outer: of_cones(&|cone| cone.outer),
+            scale: of_cones(&|cone| cone.scale),
+        });
         Self {
             ball: BoundingSphere::around(&lights.iter().map(place).collect::<Vec<_>>()),
             positions: [0, 1, 2].map(|axis| table(f64::NAN, &|light| coordinate(light, axis))),
             constant: table(0.0, &constant),
             emission: [0, 1, 2].map(|channel| table(1.0, &|light| emission(light, channel))),
-            cones: Cones::new(lights, sets),
+            cones,
         }
-    }
-}
-
-impl<S: Float> Cones<S> {
-    /// Returns `None` if all `lights` emit equally in all directions.
-    fn new(lights: &[DeltaSource<S>], sets: usize) -> Option<Self> {
-        let cone = |light: &DeltaSource<S>| match light.light.light {
-            DeltaLight::Point { cone, .. } => cone,
-            DeltaLight::Directional { .. } => None,
-        };
-        lights.iter().find_map(cone)?;
-        let all: SpotCone<S> = SpotCone::of_all_directions();
-        let cones: Vec<SpotCone<S>> =
-            lights.iter().map(|light| cone(light).unwrap_or(all)).collect();
-        let table = |value: &dyn Fn(&SpotCone<S>) -> S| {
-            Table::new(cones.iter().map(value), value(&all).to_f64(), sets)
-        };
-        Some(Self {
-            axis: [0, 1, 2].map(|i| table(&move |cone| cone.axis[i])),
-            outer: table(&|cone| cone.outer),
-            scale: table(&|cone| cone.scale),
-        })
     }
 }
 

@@ -42,10 +42,6 @@ pub struct CsgSolid {
 }
 
 impl CanonicalShape for CsgSolid {
-    fn parts(&self) -> usize {
-        self.parts.len()
-    }
-
     fn bounds(&self) -> Option<Bounds> {
         self.bounds_of(&self.tree)
     }
