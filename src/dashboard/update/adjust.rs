@@ -88,7 +88,7 @@ impl UpdateContext<'_> {
         let selection = bounds(self.scene(), &self.model.selection);
         match (self.model.probe, selection) {
             (Some(pixel), _) => self.focus_on_pixel(pixel),
-            (None, Some(ball)) => self.focus_on(ball.center),
+            (None, Some(ball)) => self.focus_on(ball.center.to_array()),
             (None, None) => self.focus_on_pixel([width / 2, height / 2]),
         }
     }

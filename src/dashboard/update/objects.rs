@@ -50,7 +50,7 @@ impl UpdateContext<'_> {
         let [x, _, forward] = scene.camera.frame();
         let eye = DVec3::from_array(scene.camera.eye);
         let distance = match bounds(scene, &self.model.selection) {
-            Some(ball) => forward.dot(DVec3::from_array(ball.center) - eye),
+            Some(ball) => forward.dot(ball.center - eye),
             None => edit::pivot_distance(scene),
         };
         let distance = if distance > 0.0 { distance } else { edit::pivot_distance(scene) };

@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 pub const F32_RAY_ERROR: f64 = 1e-5;
 
 /// Sphere that contains a form, a light, or the start points of camera rays.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundingSphere {
     /// Centre.
     pub center: DVec3,

@@ -1,7 +1,6 @@
 //! Convergence fit: the RMSE of the whole picture over the number of rays, extrapolated to an error
 //! target.
 
-use crate::schedule::Interval;
 use crate::schedule::tile::{FLATTEST, STEEPEST, clamp_slope};
 
 /// Largest number of points of the fit. From one point to the next, except to the latest one, the

@@ -2,7 +2,7 @@
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
-use crate::edit::bounds::{BoundingSphere, scene_bounds};
+use crate::edit::bounds::scene_bounds;
 use crate::edit::convert::irradiance_at;
 use crate::edit::placement::place_for;
 use crate::edit::properties::{Word, words};
@@ -18,7 +18,7 @@ use crate::value::{
 use crate::{Object, Scale, Scene, TransformOp};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo_kernel::primitive::{Form, ParallelogramForm};
+use zerkalo_kernel::primitive::{BoundingSphere, Form, ParallelogramForm};
 
 /// Returns the name and a description of each kind of object that can be added.
 pub fn object_kinds() -> Vec<Word> {
@@ -108,7 +108,7 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
 /// the solids, a length that is first limited to 0.01 R to R, where R is the radius of the scene.
 /// It is 0.15 R without solids, and 0.6 in an empty scene.
 fn usual_size(scene: &Scene) -> f64 {
-    let BoundingSphere { radius, .. } = scene_bounds(scene);
+    let radius = scene_bounds(scene).radius;
     let solid = |object: &Object| {
         let form = object.form();
         let (low, high) = form.bounds()?;
@@ -145,7 +145,6 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
 /// Fails if there is no such kind.
 pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let BoundingSphere { center, radius } = scene_bounds(scene);
-    let center = DVec3::from_array(center);
     let [right, _, forward] = scene.camera.frame();
     let level = |v: DVec3| DVec3::new(v.x, 0.0, v.z).try_normalize().unwrap_or(DVec3::X);
     let (right, forward) = (level(right), level(forward));

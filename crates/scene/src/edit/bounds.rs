@@ -6,15 +6,7 @@ use crate::edit::Target;
 use crate::value::floor_log10;
 use crate::{Object, Scene};
 use glam::DVec3;
-
-/// Bounding sphere of an object or scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoundingSphere {
-    /// Centre of the sphere, in scene units.
-    pub center: [f64; 3],
-    /// Radius of the sphere, in scene units; greater than 0.
-    pub radius: f64,
-}
+use zerkalo_kernel::primitive::BoundingSphere;
 
 /// Bounding box with sides parallel to the axes: `(lowest corner, highest corner)`.
 pub(super) type Extent = (DVec3, DVec3);
@@ -31,8 +23,8 @@ pub fn bounds(scene: &Scene, target: &Target) -> Option<BoundingSphere> {
                 Some(extent) => ball(extent),
                 None => {
                     let point = object.shape.position();
-                    let at = object.scene_from_object().transform_point3(point);
-                    BoundingSphere { center: at.to_array(), radius: scene_bounds(scene).radius }
+                    let center = object.scene_from_object().transform_point3(point);
+                    BoundingSphere { center, radius: scene_bounds(scene).radius }
                 }
             })
         }
@@ -40,7 +32,7 @@ pub fn bounds(scene: &Scene, target: &Target) -> Option<BoundingSphere> {
             let light = scene.lights.get(*i)?;
             let usual = scene_bounds(scene).radius / 10.0;
             let radius = light.surface().map_or(usual, |surface| surface.radius().max(usual));
-            Some(BoundingSphere { center: light.position()?, radius })
+            Some(BoundingSphere { center: DVec3::from(light.position()?), radius })
         }
         Target::Material(name) => {
             let used = scene.objects.iter().filter(|o| o.names_material(name));
@@ -53,7 +45,7 @@ pub fn bounds(scene: &Scene, target: &Target) -> Option<BoundingSphere> {
 /// Returns the bounding sphere of all solids; without solids, of all finite objects; without these,
 /// the unit sphere about the origin.
 pub fn scene_bounds(scene: &Scene) -> BoundingSphere {
-    middle(scene).map_or(BoundingSphere { center: [0.0; 3], radius: 1.0 }, ball)
+    middle(scene).map_or(BoundingSphere { center: DVec3::ZERO, radius: 1.0 }, ball)
 }
 
 /// Returns the bounding box of all solids or, without solids, of all finite objects.
@@ -67,11 +59,11 @@ pub(super) fn union(a: Extent, b: Extent) -> Extent {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
-/// Returns the sphere through the corners of a box.
+/// Returns the sphere through the corners of a box. Its radius is greater than 0.
 fn ball((low, high): Extent) -> BoundingSphere {
     let radius = (high - low).length() / 2.0;
     let center = low + (high - low) / 2.0;
-    BoundingSphere { center: center.to_array(), radius: radius.max(f64::MIN_POSITIVE) }
+    BoundingSphere { center, radius: radius.max(f64::MIN_POSITIVE) }
 }
 
 /// Returns the coarse step of a coordinate by arrow keys: the power of ten between a hundredth and
@@ -90,7 +82,7 @@ pub fn pivot_distance(scene: &Scene) -> f64 {
         return (DVec3::from_array(target) - eye).length();
     }
     let BoundingSphere { center, radius } = scene_bounds(scene);
-    let along = scene.camera.view().map_or(0.0, |w| w.dot(DVec3::from_array(center) - eye));
+    let along = scene.camera.view().map_or(0.0, |w| w.dot(center - eye));
     if along > 0.1 * radius { along } else { radius }
 }
 
@@ -107,7 +99,7 @@ mod tests {
         assert!(room.radius > 1.5 && room.radius < 3.0, "{room:?}");
         assert_eq!(step_length(&scene), 0.1);
         let floor = bounds(&scene, &Target::Object(0)).unwrap();
-        assert!((floor.radius - 32f64.sqrt()).abs() < 1e-12 && floor.center == [0.0; 3]);
+        assert!((floor.radius - 32f64.sqrt()).abs() < 1e-12 && floor.center == DVec3::ZERO);
         let red = bounds(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(red, bounds(&scene, &Target::Object(2)).unwrap());
         assert_eq!(bounds(&scene, &Target::Settings(SceneSettings::Film)), None);

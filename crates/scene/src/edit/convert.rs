@@ -113,7 +113,7 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
         return None;
     }
     let ball = scene_bounds(scene);
-    let center = DVec3::from_array(ball.center);
+    let center = ball.center;
     let along = match (light.direction(), light.position()) {
         (Some(direction), _) => unit(direction),
         (None, Some(from)) => unit(center - DVec3::from_array(from)),
@@ -178,7 +178,7 @@ pub(super) fn switch_falloff(
     let old = &scene.lights[index];
     let light = &mut edit.scene.lights[index];
     if light.falloff != old.falloff {
-        let center = DVec3::from_array(scene_bounds(scene).center);
+        let center = scene_bounds(scene).center;
         let factor = irradiance_at(old, center) / irradiance_at(light, center);
         edit.note = Some(refit(light, factor));
     }
@@ -294,7 +294,7 @@ mod tests {
     fn lights_of_every_kind_become_each_other() {
         let scene = mirror_room();
         let lamp = Target::Light(0);
-        let center = DVec3::from_array(scene_bounds(&scene).center);
+        let center = scene_bounds(&scene).center;
         let irradiance = |light: &Light| light.intensity * irradiance_at(light, center);
         for from in LightKind::FIELDS {
             let from = set(&scene, &lamp, "kind", from.name).unwrap().scene;
@@ -318,7 +318,7 @@ mod tests {
         let edit = set(&scene, &lamp, "kind", "directional").unwrap();
         let light = &edit.scene.lights[0];
         assert!(light.kind.key() == "directional" && light.falloff == Falloff::None);
-        let center = DVec3::from_array(scene_bounds(&scene).center);
+        let center = scene_bounds(&scene).center;
         let from = scene.lights[0].apex().unwrap();
         let expected = 40.0 / (from - center).length_squared() / std::f64::consts::PI;
         assert!((light.intensity / expected - 1.0).abs() < 0.01, "{}", light.intensity);

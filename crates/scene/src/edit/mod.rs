@@ -22,7 +22,7 @@ mod unique_name;
 mod viewpoints;
 
 pub use add::{add_light, add_object, light_kinds, object_kinds};
-pub use bounds::{BoundingSphere, bounds, pivot_distance, scene_bounds, step_length};
+pub use bounds::{bounds, pivot_distance, scene_bounds, step_length};
 pub use copy::{delete, duplicate, own_material, rename};
 pub use increment::{step, toggle};
 pub use lens::{change_aperture, focus_on};

@@ -3,7 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
 use crate::camera::Camera;
-use crate::edit::bounds::{BoundingSphere, Extent, scene_bounds};
+use crate::edit::bounds::{Extent, scene_bounds};
 use crate::edit::{Edit, EditError, Target};
 use crate::value::{floor_log10, round_significant, rounded_to};
 use crate::{Object, Scene, TransformOp};
@@ -86,7 +86,7 @@ fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
 /// Returns a position for the centre of the underside of a new object of `size`: on a surface, free
 /// of other objects, near the middle of the view, and visible if possible.
 pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
-    let BoundingSphere { radius, .. } = scene_bounds(scene);
+    let radius = scene_bounds(scene).radius;
     let eye = DVec3::from_array(scene.camera.eye);
     let forward = scene.camera.view().unwrap_or(DVec3::NEG_Z);
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
