@@ -457,7 +457,7 @@ impl<L: SimdFloat> World<L> {
                 scales,
                 precision: if L::EPSILON > 1e-10 { "single" } else { "double" },
                 lanes: L::NAME,
-                light_period: lights.choice.as_ref().map_or(1, LightChoice::period),
+                light_period: lights.choice.as_ref().map_or(1, |choice| choice.sets as u32),
                 inventory: String::new(),
                 biases: truncation_bounds(scene),
             },

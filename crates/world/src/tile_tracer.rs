@@ -16,11 +16,14 @@ pub struct CameraTracer<'a, L: SimdFloat> {
     sampler: Sampler<L>,
 }
 
-impl<'a, L: SimdFloat> CameraTracer<'a, L> {
-    pub(super) fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
-        Self { world, sampler: Sampler::new(*sampling, world.camera_dimensions()) }
+impl<L: SimdFloat> World<L> {
+    /// Creates the tracer of camera samples. `sampling` has the seed and the sample sequence.
+    pub fn camera_tracer(&self, sampling: &SampleSettings) -> CameraTracer<'_, L> {
+        CameraTracer { world: self, sampler: Sampler::new(*sampling, self.camera_dimensions()) }
     }
+}
 
+impl<L: SimdFloat> CameraTracer<'_, L> {
     /// Creates the tracer of at most [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) `pixels`, pairs
     /// of column and row, in `replicate` 0 (A) or 1 (B). Culling uses the rectangle of the raster
     /// with the upper left corner `origin` and the size `extent`, which must contain the pixels.

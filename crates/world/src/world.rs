@@ -7,10 +7,9 @@ use crate::integrator::nested_dielectrics::NestedDielectrics;
 use crate::integrator::surface_textures::SurfaceTextures;
 use crate::lights::groups::LightGroups;
 use crate::lights::on_surfaces::OnSurface;
-use crate::tile_tracer::CameraTracer;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::primitive::Aggregate;
-use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings};
+use zerkalo_kernel::sampling::CameraDimensions;
 use zerkalo_scene::camera::PerspectiveCamera;
 use zerkalo_scene::light::{DeltaLight, EnvironmentLight};
 use zerkalo_scene::material::Bsdf;
@@ -126,11 +125,6 @@ impl<L: SimdFloat> World<L> {
     /// Returns which random positions camera rays use: in the pixel, on the lens, both or none.
     pub fn camera_dimensions(&self) -> CameraDimensions {
         CameraDimensions { pixel: self.jitter, lens: self.camera.lens.is_some() }
-    }
-
-    /// Creates the tracer of camera samples. `sampling` has the seed and the sample sequence.
-    pub fn camera_tracer(&self, sampling: &SampleSettings) -> CameraTracer<'_, L> {
-        CameraTracer::new(self, sampling)
     }
 
     /// Returns `true` if all samples of a tile with these candidates are black.

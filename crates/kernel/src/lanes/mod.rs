@@ -324,12 +324,6 @@ pub fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
 /// integer: the difference between the bits of the sum and the bits of the constant.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
-/// Rounds `x` to the nearest integer, ties to even. `|x|` must be below 2^51.
-#[inline(always)]
-fn round_i64(x: f64) -> i64 {
-    ((x + ROUNDER).to_bits() as i64).wrapping_sub(ROUNDER.to_bits() as i64)
-}
-
 /// Prefetches the first cache line of `value`; does nothing on processors without prefetch.
 #[inline(always)]
 pub fn prefetch<T>(value: &T) {

@@ -1,7 +1,7 @@
 //! Implementations of the SIMD traits with one lane: `f32` and `f64`. Operations have the same
 //! order as with several lanes, so that results have identical bits.
 
-use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, by_own_methods, round_i64};
+use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, by_own_methods};
 use std::num::Wrapping;
 
 impl Mask for bool {
@@ -119,7 +119,7 @@ macro_rules! scalar_lanes {
             }
             #[inline(always)]
             fn fixed_sum(self, scale: f64) -> i64 {
-                round_i64(f64::from(self) * scale)
+                (f64::from(self) * scale).round_ties_even() as i64
             }
             #[inline(always)]
             fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {

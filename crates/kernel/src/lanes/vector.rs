@@ -100,14 +100,6 @@ fn gather16(table: &[f32], indices: &[u32; MAX_WIDTH]) -> f32x16 {
     f32x16::new(cast(lanes))
 }
 
-/// Returns four of the numbers `sums`, or the sums of both halves if there are eight.
-#[inline(always)]
-fn fold_to_four(sums: &[i64]) -> i64x4 {
-    sums.chunks_exact(4)
-        .map(|four| i64x4::new([four[0], four[1], four[2], four[3]]))
-        .fold(i64x4::splat(0), |sum, four| sum + four)
-}
-
 macro_rules! vector_lanes {
     ($vector:ident, $half:ident, $scalar:ident, $bits:ident, $raw:ident, $n:literal, [$double:ident, $long:ident],
      $unit:expr $(; $gather:ident)?) => {
@@ -207,8 +199,7 @@ macro_rules! vector_lanes {
                     let x = $double::new(std::array::from_fn(|i| f64::from(part[i])));
                     sum += cast::<$double, $long>(x.mul_add(scale, rounder));
                 }
-                let [a, b, c, d] = fold_to_four(sum.as_array()).to_array();
-                let all = (a.wrapping_add(b)).wrapping_add(c.wrapping_add(d));
+                let all = sum.as_array().iter().fold(0i64, |all, lane| all.wrapping_add(*lane));
                 all.wrapping_sub((ROUNDER.to_bits() as i64).wrapping_mul($n))
             }
             #[inline(always)]

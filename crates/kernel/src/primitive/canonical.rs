@@ -105,10 +105,7 @@ pub trait CanonicalShape {
     /// Returns the largest magnitude of a coordinate of the bounding box; infinity if the geometry
     /// has no finite bounds.
     fn max_coordinate(&self) -> f64 {
-        match self.bounds() {
-            Some((low, high)) => low.abs().max(high.abs()).max_element(),
-            None => f64::INFINITY,
-        }
+        self.bounds().map_or(f64::INFINITY, |(low, high)| low.abs().max(high.abs()).max_element())
     }
 
     /// Returns a bounding sphere; its radius is infinite if the geometry has no finite bounds.

@@ -34,11 +34,9 @@ impl CanonicalShape for EllipsoidForm {
     }
 
     fn bounding_sphere(&self) -> BoundingSphere {
-        let map = &self.scene_from_unit;
-        let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
-            .map(|a| a.length_squared());
-        // The Frobenius norm is at least as large as the largest half-axis (singular value).
-        BoundingSphere { center: map.translation, radius: (x + y + z).sqrt() }
+        let DAffine3 { matrix3, translation } = &self.scene_from_unit;
+        // The norm is at least as large as the largest half-axis (singular value).
+        BoundingSphere { center: *translation, radius: frobenius_norm(matrix3) }
     }
 
     fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {

@@ -51,12 +51,8 @@ impl PiecewiseConstant2D {
         let along_row = |row: usize| -> Vec<f64> {
             let row: Vec<f64> =
                 pixels[row * columns..(row + 1) * columns].iter().map(luminance).collect();
-            let around = |i: usize| {
-                let before = row[if i == 0 { columns - 1 } else { i - 1 }];
-                let after = row[if i + 1 == columns { 0 } else { i + 1 }];
-                smoothed(before, row[i], after)
-            };
-            (0..columns).map(around).collect()
+            let at = |i: usize| row[i % columns];
+            (0..columns).map(|i| smoothed(at(i + columns - 1), at(i), at(i + 1))).collect()
         };
         let mut out = Self {
             columns,

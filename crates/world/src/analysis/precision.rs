@@ -112,6 +112,9 @@ impl Clearance {
 /// Returns the gaps between two faces of different objects, at the points where the faces are
 /// closest. Two spheres have two gaps: side by side, and one inside the other.
 fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
+    let round_gap = |distance: f64, place: DVec3, radius: f64| {
+        Some(Clearance { width: distance.abs(), round: Some((place, radius)) })
+    };
     match (a, b) {
         (ProxyFace::Flat(a), ProxyFace::Flat(b)) => {
             let along = a.normal.dot(b.normal);
@@ -123,23 +126,15 @@ fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
             let (BoundingSphere { center, radius }, HalfSpace { normal, offset }) = (ball, plane);
             let height = normal.dot(*center) - offset;
             let place = center - normal * radius.copysign(height);
-            [
-                Some(Clearance {
-                    width: (height.abs() - radius).abs(),
-                    round: Some((place, *radius)),
-                }),
-                None,
-            ]
+            [round_gap(height.abs() - radius, place, *radius), None]
         }
         (ProxyFace::Round(a), ProxyFace::Round(b)) => {
             let (r, s) = (a.radius, b.radius);
             let between = a.center.distance(b.center);
             let place = a.center + (b.center - a.center).normalize_or(DVec3::X) * r;
-            let gap = |distance: f64, radius: f64| {
-                Some(Clearance { width: (between - distance).abs(), round: Some((place, radius)) })
-            };
             // Spheres side by side, and one sphere inside the other.
-            [gap(r + s, r * s / (r + s)), gap((r - s).abs(), r * s / (r - s).abs())]
+            let (sum, difference) = (r + s, (r - s).abs());
+            [sum, difference].map(|distance| round_gap(between - distance, place, r * s / distance))
         }
     }
 }

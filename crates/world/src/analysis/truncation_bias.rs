@@ -1,7 +1,7 @@
 //! Upper bounds of the bias that truncated paths cause (`max_depth`, `min_throughput`,
 //! `max_diffuse_depth` and `caustics`).
 
-use crate::lights::emissive_forms::is_sampled;
+use crate::lights::emissive_forms::surface_of;
 use glam::DVec3;
 use zerkalo_kernel::primitive::Form;
 use zerkalo_scene::material::{Fresnel, Material, Texture};
@@ -234,7 +234,7 @@ fn albedo_under_unsampled_emission(scene: &Scene) -> Option<f64> {
     let material = |name: &str| scene.materials.get(name).unwrap_or(&default);
     let is_found_by_rays_alone = |object: &Object| {
         object.materials().into_iter().any(|name| material(name).emits())
-            && !is_sampled(&object.form())
+            && surface_of(&object.form()).is_none()
     };
     let albedo = |object: &Object| {
         let albedo = |name| max_diffuse_albedo(material(name), object);

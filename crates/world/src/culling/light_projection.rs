@@ -94,6 +94,9 @@ impl FaceRect {
     }
 }
 
+/// Projection from a light, and the rectangles of each sphere.
+type Projected<S> = (LightProjection<S>, Vec<Vec<FaceRect>>);
+
 /// Projection from a light, and the bounding rectangles of all projected spheres.
 pub(crate) struct ProjectedBounds<S> {
     pub projection: LightProjection<S>,
@@ -134,7 +137,7 @@ fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
 }
 
 /// Projects spheres to the faces of a cube map.
-fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
+fn cube_map<S: Float>(balls: &[BoundingSphere]) -> Projected<S> {
     let rect_on = |ball: &BoundingSphere, face: usize| {
         let axis = |i: usize| ball.center[(face / 2 + i) % 3];
         let z = if face.is_multiple_of(2) { axis(0) } else { -axis(0) };
@@ -151,9 +154,7 @@ fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<
 
 /// Projects spheres by a perspective projection. Returns `None` if they are not on one side of the
 /// light, or if a coordinate would exceed [`MAX_TANGENT`].
-fn perspective<S: Float>(
-    balls: &[BoundingSphere],
-) -> Option<(LightProjection<S>, Vec<Vec<FaceRect>>)> {
+fn perspective<S: Float>(balls: &[BoundingSphere]) -> Option<Projected<S>> {
     let forward = balls.iter().map(|b| b.center).sum::<DVec3>().try_normalize()?;
     let (right, up) = forward.any_orthonormal_pair();
     let axes = [right, up, forward];
@@ -169,10 +170,7 @@ fn perspective<S: Float>(
 }
 
 /// Projects spheres along `direction`, which points to the light.
-fn orthographic<S: Float>(
-    direction: DVec3,
-    balls: &[BoundingSphere],
-) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
+fn orthographic<S: Float>(direction: DVec3, balls: &[BoundingSphere]) -> Projected<S> {
     let (right, up) = direction.any_orthonormal_pair();
     let square = |ball: &BoundingSphere| {
         let center = DVec2::new(ball.center.dot(right), ball.center.dot(up));
@@ -188,7 +186,7 @@ fn planar<S: Float>(
     is_perspective: bool,
     axes: [DVec3; 3],
     corners: &[(DVec2, DVec2)],
-) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
+) -> Projected<S> {
     let low = corners.iter().map(|s| s.0).fold(DVec2::INFINITY, DVec2::min);
     let high = corners.iter().map(|s| s.1).fold(DVec2::NEG_INFINITY, DVec2::max);
     let scale = (high - low).recip();

@@ -45,9 +45,8 @@ pub(crate) struct DiffuseReservoir<L: SimdFloat> {
     lanes: L::Mask,
     /// Sum of the weights of all offered hits.
     sum: L,
-    /// Weight of the chosen hit: the largest channel of `throughput`.
-    weight: L,
-    /// Throughput of the path up to the chosen hit, times its diffuse albedo.
+    /// Throughput of the path up to the chosen hit, times its diffuse albedo. Its largest channel is
+    /// the weight of the hit.
     throughput: Vec3<L>,
     origin: Vec3<L>,
     normal: Vec3<L>,
@@ -62,7 +61,6 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
             offers: 0,
             lanes: L::mask(false),
             sum: L::zero(),
-            weight: L::zero(),
             throughput: Vec3::zero(),
             origin: Vec3::zero(),
             normal: Vec3::zero(),
@@ -100,7 +98,6 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         }
         self.offers += 1;
         self.lanes = self.lanes | lanes;
-        self.weight = L::select(taken, weight, self.weight);
         self.throughput = Vec3::select(taken, throughput, self.throughput);
         self.origin = Vec3::select(taken, interaction.ray_origin(), self.origin);
         self.normal = Vec3::select(taken, interaction.normal, self.normal);
@@ -120,7 +117,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
         let direction = Frame::around(self.normal).to_world(cosine_hemisphere(u, v));
         // The throughput is divided by the probability of the choice, weight / sum.
-        let scale = self.sum / L::select(self.lanes, self.weight, L::one());
+        let weight = self.throughput.max_element();
+        let scale = self.sum / L::select(self.lanes, weight, L::one());
         let path = Path {
             ray: Ray { origin: self.origin, direction },
             throughput: Path::bounded(self.throughput * scale),

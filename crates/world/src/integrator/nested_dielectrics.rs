@@ -13,7 +13,7 @@ use crate::integrator::vertex::Vertex;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, distinct};
 use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId, box_distance};
-use zerkalo_scene::material::{Bsdf, InterfaceMedia, InterfaceQuery};
+use zerkalo_scene::material::{Bsdf, InterfaceMedia, InterfaceQuery, Transmission};
 
 /// Largest number of solids that a medium stack holds. If a ray is inside of more solids, the stack
 /// has those listed last in the scene file.
@@ -167,23 +167,14 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         if bsdfs.iter().all(|bsdf| bsdf.transmission.is_none()) {
             return None;
         }
-        let mut indices = vec![None; forms.len() + 1];
-        let mut absorption = vec![[L::Scalar::default(); 3]; forms.len() + 1];
+        // Transmission of each solid, by priority. The first transmissive part of a compound
+        // determines the index of refraction and the absorption.
+        let mut solids = vec![None; forms.len() + 1];
         let priority_of = primitives.iter().zip(bsdf_of).map(|(id, bsdf)| {
-            let flat = forms[id.form].is_flat();
-            let priority = id.form + 1;
-            match transmission_of(*bsdf) {
-                Some(transmission) if !flat => {
-                    // The first transmissive part of a compound determines the index of refraction
-                    // and the absorption.
-                    if indices[priority].is_none() {
-                        indices[priority] = Some(transmission.index);
-                        absorption[priority] = transmission.absorption;
-                    }
-                    priority as u32
-                }
-                _ => 0,
-            }
+            let transmission = transmission_of(*bsdf).filter(|_| forms[id.form].is_solid());
+            let priority = transmission.map_or(0, |_| id.form + 1);
+            solids[priority] = solids[priority].or(transmission);
+            priority as u32
         });
         let priority_of: Vec<u32> = priority_of.collect();
         let transparent: Vec<bool> =
@@ -191,13 +182,19 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let input_error = geometry.input_error();
         let contacts =
             Contacts::new(forms, primitives, &transparent, &priority_of, L::EPSILON, input_error);
-        let solid_around_eye = |(form, index): (usize, &Option<_>)| {
-            let may_contain_eye = index.is_some() && may_reach(start, &forms[form]);
+        let solid_around_eye = |(form, solid): (usize, &Option<_>)| {
+            let may_contain_eye = solid.is_some() && may_reach(start, &forms[form]);
             may_contain_eye
                 .then(|| (form as u32 + 1, Aggregate::with_tree(&forms[form..=form], false)))
         };
-        let around_eye = indices[1..].iter().enumerate().filter_map(solid_around_eye).collect();
-        let indices = indices.into_iter().map(|n| n.unwrap_or(L::Scalar::from_f64(1.0))).collect();
+        let around_eye = solids[1..].iter().enumerate().filter_map(solid_around_eye).collect();
+        let vacuum = L::Scalar::from_f64(1.0);
+        let indices =
+            solids.iter().map(|solid| solid.map_or(vacuum, |solid| solid.index)).collect();
+        let absorption_of = |solid: &Option<Transmission<_>>| {
+            solid.map_or([L::Scalar::default(); 3], |solid| solid.absorption)
+        };
+        let absorption: Vec<_> = solids.iter().map(absorption_of).collect();
         let absorbs = absorption.iter().flatten().any(|c| c.to_f64() > 0.0);
         let absorption = absorbs.then_some(absorption);
         Some(Self { priority_of, indices, absorption, around_eye, contacts })

@@ -189,11 +189,6 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let (mut layer, mut offset, mut coincident_lanes) =
             (L::zero(), interaction.offset, L::mask(false));
         if let Some(next) = behind {
-            // The surface that the rays have left is in front of the surface that they hit, and
-            // occludes all lights on the side of the rays.
-            if world.shadows {
-                interaction.cover(next.lanes);
-            }
             (layer, coincident_lanes) = (next.layer, next.lanes);
             offset = offset.max(next.offset.masked(coincident_lanes));
         }
@@ -207,14 +202,16 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 if let Some(distinct) = next_distinct(hit.primitive, lanes) {
                     *interaction = interact::<_, false>(world, ray, hit, distinct, lanes);
                     offset = offset.max(interaction.offset);
-                    if let (Some(next), true) = (behind, world.shadows) {
-                        interaction.cover(next.lanes);
-                    }
                 }
             }
             layer = L::select(first.touching, first.layer, layer);
             coincident_lanes = coincident_lanes | first.touching;
             offset = offset.max(first.offset.masked(first.touching));
+        }
+        if let (Some(next), true) = (behind, world.shadows) {
+            // The surface that the rays have left is in front of the surface that they hit, and
+            // occludes all lights on the side of the rays.
+            interaction.cover(next.lanes);
         }
         interaction.offset = L::select(coincident_lanes, offset, interaction.offset);
         let coincident = CoincidentState::behind(interaction, coincident_lanes, layer);

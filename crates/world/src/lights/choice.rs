@@ -77,8 +77,9 @@ struct Cones<S> {
 pub(crate) struct LightChoice<S> {
     /// Light group of all lights of this choice.
     pub group: usize,
-    /// Number of sets, a power of two.
-    sets: usize,
+    /// Number of sets, a power of two. As many successive samples of a pixel together trace a shadow
+    /// ray to each light once.
+    pub sets: usize,
     strata: Vec<Stratum<S>>,
 }
 
@@ -137,12 +138,6 @@ impl<S: Float> LightChoice<S> {
         Some(Self { group, sets, strata })
     }
 
-    /// Returns the light period: the number of successive samples of a pixel that together trace a
-    /// shadow ray to each light once.
-    pub fn period(&self) -> u32 {
-        self.sets as u32
-    }
-
     /// Returns a sphere around the lights of each stratum.
     pub fn balls(&self) -> impl Iterator<Item = BoundingSphere> {
         self.strata.iter().map(|stratum| stratum.ball)
@@ -161,16 +156,13 @@ impl<S: Float> LightChoice<S> {
 impl<S: Float> Table<S> {
     /// Creates a table for `sets` sets from the values of the lights. `absent` is the value of sets
     /// without a light of the stratum.
-    fn new(values: impl Iterator<Item = S> + Clone, absent: f64, sets: usize) -> Self {
-        let absent = S::from_f64(absent);
-        let is_full = values.clone().count() == sets;
-        match common(values.clone()) {
-            Some(value) if is_full => Self::Common(value),
-            _ => {
-                let padded = values.chain(std::iter::repeat(absent));
-                Self::BySet(padded.take(sets.max(MIN_TABLE)).collect())
-            }
+    fn new(values: impl Iterator<Item = S>, absent: f64, sets: usize) -> Self {
+        let mut values: Vec<S> = values.collect();
+        if values.len() == sets && values.iter().all(|value| *value == values[0]) {
+            return Self::Common(values[0]);
         }
+        values.resize(sets.max(MIN_TABLE), S::from_f64(absent));
+        Self::BySet(values)
     }
 
     #[inline(always)]
@@ -358,14 +350,9 @@ fn bright_lights(powers: &[DVec3], sets: usize) -> Vec<usize> {
         (common + sum(bright) + sets as f64 * sum(others)) * cost
     };
     let efforts: Vec<f64> = (0..=MAX_BRIGHT.min(powers.len() - 1)).map(effort).collect();
-    let best = (0..efforts.len()).reduce(|a, b| if efforts[b] < efforts[a] { b } else { a });
+    let best = (0..efforts.len()).min_by(|a, b| efforts[*a].total_cmp(&efforts[*b]));
     order.truncate(best.unwrap_or(0));
     order
-}
-
-fn common<T: PartialEq>(mut items: impl Iterator<Item = T>) -> Option<T> {
-    let first = items.next()?;
-    items.all(|item| item == first).then_some(first)
 }
 
 #[cfg(test)]

@@ -11,11 +11,6 @@ use zerkalo_scene::value::{sort_by_number, total_order};
 /// single precision.
 const MAX_TRIANGLES: usize = 1 << 16;
 
-/// Returns `true` if light can be sampled from points on an object of this shape.
-pub(crate) fn is_sampled(form: &Form) -> bool {
-    surface_of(form).is_some()
-}
-
 /// Returns the surface from which light of the object `form` is sampled; `None` if its points
 /// cannot be sampled.
 pub(crate) fn surface_of(form: &Form) -> Option<EmissiveSurface> {

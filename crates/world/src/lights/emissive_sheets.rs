@@ -78,8 +78,7 @@ pub(crate) fn move_off_surfaces(
         fixed[object] |= transmits[carrier];
         contacts.entry(object).or_default().push(contact);
     }
-    let mut moved = geometry.forms.clone();
-    let mut has_moved = false;
+    let mut moved: Option<Vec<Form>> = None;
     for (object, contacts) in contacts {
         let Some(sheet) = sheets[object].as_ref().filter(|_| !fixed[object]) else { continue };
         let plane = sheet.plane;
@@ -96,11 +95,11 @@ pub(crate) fn move_off_surfaces(
         let shift = |contact: &Contact| GAP_LIFTS * lift - side * contact.height;
         let shift = contacts.iter().map(shift).fold(0.0, f64::max);
         let by = DAffine3::from_translation(plane.normal * (side * shift));
-        moved[object] = forms[object].clone().transformed(&by);
-        has_moved = true;
+        moved.get_or_insert_with(|| forms.to_vec())[object] =
+            forms[object].clone().transformed(&by);
     }
     let RecenteredGeometry { origin, extent, .. } = *geometry;
-    has_moved.then_some(RecenteredGeometry { origin, forms: moved, extent })
+    moved.map(|forms| RecenteredGeometry { origin, forms, extent })
 }
 
 /// Flat emissive object.

@@ -52,12 +52,15 @@ impl LightGroupSource {
         }
     }
 
-    /// Returns the emission of a light or material; black for other sources.
+    /// Returns the emission of the source, which is the light weight of its group in the picture of
+    /// `scene`; white for several lights and materials.
     pub(crate) fn emission(&self, scene: &Scene) -> [f64; 3] {
         match self {
+            Self::Ambient => scene.ambient.color.0,
+            Self::Background => scene.background.color.0,
             Self::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
             Self::Material(name) => scene.materials.get(name).map_or([0.0; 3], Material::emitted),
-            Self::Ambient | Self::Background | Self::Shared(_) => [0.0; 3],
+            Self::Shared(_) => [1.0; 3],
         }
     }
 }
@@ -167,13 +170,7 @@ impl LightGroups {
     /// `scene`, which may differ from the compiled scene in emissions and on/off switches, ambient
     /// light and background.
     pub fn weights(&self, scene: &Scene) -> Vec<[f64; 3]> {
-        let weight = |member: &LightGroupSource| match member {
-            LightGroupSource::Ambient => scene.ambient.color.0,
-            LightGroupSource::Background => scene.background.color.0,
-            LightGroupSource::Light(_) | LightGroupSource::Material(_) => member.emission(scene),
-            LightGroupSource::Shared(_) => [1.0; 3],
-        };
-        self.members.iter().map(weight).collect()
+        self.members.iter().map(|member| member.emission(scene)).collect()
     }
 
     /// Returns the name of each group, for layers of image files.
@@ -245,19 +242,14 @@ pub(crate) fn emissive_materials(scene: &Scene) -> Vec<String> {
 }
 
 /// Returns the emission of a light; black if it is off.
-pub(crate) fn emission(light: &Light) -> [f64; 3] {
+fn emission(light: &Light) -> [f64; 3] {
     if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
-}
-
-/// Returns `true` if the light is on and its emission is not black.
-pub(crate) fn emits(light: &Light) -> bool {
-    emission(light) != [0.0; 3]
 }
 
 /// Returns `true` if the light changes the picture: it emits, and surfaces reflect its light
 /// (`lit`) or the camera sees it.
 pub(crate) fn contributes(light: &Light, lit: bool) -> bool {
-    emits(light) && (lit || light.visible && light.has_radiance())
+    emission(light) != [0.0; 3] && (lit || light.visible && light.has_radiance())
 }
 
 #[cfg(test)]
