@@ -37,7 +37,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
         let (mark, word, style) = state(shard, &theme);
         let style = if selected.is_some() { plain } else { style };
         to.put(mark, style);
-        // Ages below one second would change at each report.
+        // Fractions of a second would change at each report.
         let age = shard.age.map_or(String::new(), |age| duration(age.as_secs() as f64));
         right(&mut to, [(&age, AGE)], if word == LATE { style } else { dim });
         if [MISSING, NOT_USED].contains(&word) {
