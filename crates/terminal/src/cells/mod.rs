@@ -149,14 +149,21 @@ pub fn picture_cells(raster: &Raster, colors: Colors, settled: bool) -> Buffer {
             (Colors::Mono, None) => two_halves(Color::Reset, None),
         }
     };
-    let mut buffer =
-        Buffer::empty(Rect::new(0, 0, raster.width as u16, raster.height.div_ceil(2) as u16));
-    for (index, out) in buffer.content.iter_mut().enumerate() {
+    let area = Rect::new(0, 0, raster.width as u16, raster.height.div_ceil(2) as u16);
+    let content = (0..area.area() as usize).map(|index| {
         let PictureCell { glyph, fg, bg } = cell(index);
-        out.set_char(glyph).set_fg(fg).set_bg(bg);
-    }
-    buffer
+        let mut out = UPPER_HALF;
+        if glyph != '▀' {
+            out.set_char(glyph);
+        }
+        out.set_fg(fg).set_bg(bg);
+        out
+    });
+    Buffer { area, content: content.collect() }
 }
+
+/// Copied for most cells, because setting a glyph or cloning a cell takes several times as long.
+const UPPER_HALF: Cell = Cell::new("▀");
 
 /// Creates a cell from the colours of its halves. `lower` is `None` below the last row of pixels.
 fn two_halves(upper: Color, lower: Option<Color>) -> PictureCell {
