@@ -3,7 +3,6 @@
 use crate::dashboard::text::durations;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
-use zerkalo_render::schedule::Interval;
 use zerkalo_render::session::Report;
 
 /// Seconds of rendering before the first output.

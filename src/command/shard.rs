@@ -141,7 +141,7 @@ fn saved(path: &Path, part: &Part) -> Result<Option<SavedShard>, Failure> {
     if shard.number != part.shards[0].number {
         return Err(failed(&format!("holds shard {}", shard.number)));
     }
-    let film = reader.read().inspect_err(report).ok().map(|(_, film)| film);
+    let film = reader.read().inspect_err(report).ok().map(|saved| saved.film);
     Ok(film.map(|film| SavedShard { film, rays: found.rays, is_complete: shard.complete }))
 }
 

@@ -3,7 +3,6 @@
 
 use crate::dashboard::Convergence;
 use crate::dashboard::text::{duration, durations};
-use zerkalo_render::schedule::Interval;
 use zerkalo_render::session::{QUALITIES, Report};
 
 /// Appearance of the picture at each target in [`QUALITIES`].

@@ -82,7 +82,9 @@ impl UpdateContext<'_> {
         let size = scene.film.size.map(f64::from);
         // Bounds without extent get a radius that also shows the surroundings.
         let radius = if ball.radius > 0.0 { ball.radius } else { 5.0 * step_length(scene) };
-        self.set_camera(Coalesce::Single, |camera, _| camera.framed(ball.center.to_array(), radius, size));
+        self.set_camera(Coalesce::Single, |camera, _| {
+            camera.framed(ball.center.to_array(), radius, size)
+        });
     }
 
     pub(super) fn reset_camera(&mut self) {

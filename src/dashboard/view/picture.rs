@@ -148,8 +148,9 @@ fn round_up(value: f64) -> f64 {
 fn beauty(model: &Model, snapshot: &Snapshot, size: [usize; 2]) -> Option<Raster> {
     let picture = snapshot.picture.as_ref()?;
     let newest = snapshot.weights_for(model.scene());
-    let mixed = picture.mixed(newest.as_ref().unwrap_or(&snapshot.weights));
-    Some((mixed, [picture.cols, picture.rows]))
+    let radiance = picture.mixed(newest.as_ref().unwrap_or(&snapshot.weights));
+    let live = displayed(&radiance, &model.display, [picture.cols, picture.rows]);
+    Some(resized(live, size))
 }
 
 /// Returns a raster of the first hits in the colours `color`, and [`NO_HIT`] for rays without a

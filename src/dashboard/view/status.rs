@@ -10,7 +10,7 @@ use crate::dashboard::view::theme::Theme;
 use crate::dashboard::view::watch;
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
-use zerkalo_render::schedule::{Interval, StoppedBy};
+use zerkalo_render::schedule::StoppedBy;
 use zerkalo_render::session::{Report, State};
 
 /// Part of the status line, shown or omitted as a whole.

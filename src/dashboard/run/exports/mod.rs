@@ -46,7 +46,7 @@ impl Exporter {
         };
         let stem = self.stem(header.source().unwrap_or_default());
         let path = numbered(&stem, format.extension(), write)?;
-        let size @ [width, height] = [picture.film.header.width, picture.film.header.height];
+        let [width, height] = [picture.film.header.width, picture.film.header.height];
         let (spp, noise) = (picture.report.spp.mean, picture.report.noise);
         let noise = noise.map_or("unknown".to_string(), |n| format!("{:.2} levels", n.rmse.levels));
         Ok(Exported {
