@@ -28,8 +28,8 @@ pub struct BinaryNode {
     pub aabb: Aabb,
     /// Number of primitives of a leaf; 0 for an inner node.
     pub primitives: u32,
-    /// Position of a leaf's first primitive in [`BinaryBvh::order`]. For an inner node, the index
-    /// of its first child; the second child is the next node.
+    /// Leaf: position of its first primitive in [`BinaryBvh::order`]. Inner node: index of its
+    /// first child, which its second child follows.
     pub first: u32,
 }
 
@@ -44,16 +44,16 @@ impl BinaryNode {
     }
 }
 
-/// Returns the index of the sibling of `node`, which must not be the root. Siblings are neighbours
-/// in the list of nodes; the first has an odd index, because the root has index 0.
+/// Returns the index of the sibling of `node`, which must not be the root. The first of two
+/// siblings has an odd index, and the second one the next even index.
 pub fn sibling(node: usize) -> usize {
     ((node - 1) ^ 1) + 1
 }
 
 pub struct BinaryBvh {
-    /// The root is the first node; the nodes near the root follow it.
+    /// Nodes, each pair of siblings side by side. The root is the first node.
     pub nodes: Vec<BinaryNode>,
-    /// Indices of the primitives, sorted by leaf.
+    /// Indices of the primitives, grouped by leaf.
     pub order: Vec<u32>,
 }
 
@@ -72,8 +72,8 @@ impl BinaryBvh {
         order
     }
 
-    /// Merges each subtree of at most `in_leaf` primitives into one leaf, unless this increases the
-    /// cost of the tree by the surface area heuristic. `traversal_cost` is as in `BuildQuality`.
+    /// Merges a subtree of at most `in_leaf` primitives into one leaf if this does not raise the
+    /// tree's cost by the surface area heuristic. `traversal_cost` is as in `BuildQuality`.
     pub fn merge_leaves(&mut self, in_leaf: u32, traversal_cost: f32) {
         let mut counts = vec![0; self.nodes.len()];
         let mut costs = vec![0.0; self.nodes.len()];
@@ -95,7 +95,7 @@ impl BinaryBvh {
         }
         let mut nodes = Vec::new();
         let mut order = Vec::with_capacity(self.order.len());
-        // Indices in `self.nodes` of the new nodes, level by level.
+        // Index in `self.nodes` of each new node, level by level.
         let mut sources = vec![0];
         while let Some(source) = sources.get(nodes.len()) {
             let source: usize = *source;

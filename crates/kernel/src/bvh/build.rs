@@ -13,13 +13,13 @@ pub const BVH_WIDTH: usize = 8;
 /// Bit of a child index that marks a leaf.
 pub const LEAF_FLAG: u32 = 1 << 31;
 
-/// Inner node of a BVH8. Unused slots hold empty boxes, which no ray intersects.
+/// Inner node of a BVH8. An unused slot holds an empty box, which no ray intersects.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
 pub struct Bvh8Node {
-    /// Six rows of one number per child: smallest x, y and z of the children's boxes, then largest.
+    /// Bounds of the children: lowest x, y and z, then highest x, y and z, one number per child.
     pub bounds: [[f32; BVH_WIDTH]; 6],
-    /// Index of each child in the node array, or [`LEAF_FLAG`] and the index of a leaf.
+    /// Children: index of an inner node, or [`LEAF_FLAG`] | index of a leaf.
     pub child: [u32; BVH_WIDTH],
 }
 
@@ -47,20 +47,20 @@ pub struct Bvh8 {
 /// Effort of a BVH build.
 #[derive(Clone, Copy, Debug)]
 pub struct BuildQuality {
-    /// Window in which the clustering searches for nearest nodes.
+    /// Window in which the clustering searches for the nearest node of each node.
     pub window: SearchWindow,
     /// Share of the nodes, 0 to 1, that reinsertion may move before small leaves are merged.
     pub reinsertion: f32,
     /// Share of the nodes, 0 to 1, that reinsertion may move after small leaves have been merged.
     pub second_reinsertion: f32,
-    /// Cost of a node visit divided by the cost of a primitive's intersection test, in the surface
+    /// Cost of a node visit divided by the cost of a primitive's intersection test, for the surface
     /// area heuristic. A higher cost gives larger leaves.
     pub traversal_cost: f32,
 }
 
 impl BuildQuality {
-    /// Short build, for a million triangles or more. SIMD tests all triangles of a leaf at once, so
-    /// that large leaves are cheap.
+    /// Short build, for a million triangles or more. Leaves may be large, because SIMD tests all
+    /// triangles of a leaf at once.
     pub const FAST: Self = Self {
         window: SearchWindow { narrow_passes: 2, distance: 6 },
         reinsertion: 0.02,
@@ -80,9 +80,9 @@ impl BuildQuality {
 pub struct Bvh8Build {
     /// Hierarchy, whose leaf indices refer to `leaves`.
     pub bvh: Bvh8,
-    /// Indices of all primitives, sorted by leaf.
+    /// Indices of all primitives, grouped by leaf.
     pub order: Vec<u32>,
-    /// First position and number of each leaf's primitives in `order`.
+    /// Primitives of each leaf: position of the first one in `order`, and their number.
     pub leaves: Vec<(u32, u32)>,
 }
 
@@ -115,7 +115,7 @@ impl Bvh8 {
 }
 
 impl Bvh8Build {
-    /// Replaces `binary` by eight-wide nodes. Leaves stay as they are.
+    /// Collapses `binary` into eight-wide nodes. Leaves keep their primitives.
     fn collapse(binary: BinaryBvh) -> Self {
         let plan = CollapsePlan::new(&binary);
         let mut todo = vec![(0usize, 0usize, 1usize)];
@@ -150,25 +150,25 @@ impl Bvh8Build {
 }
 
 /// Optimal collapse of a binary BVH into wide nodes. It minimises the sum of the surface areas of
-/// the nodes, and thereby the expected number of nodes that a random ray visits (Ylitie, Karras and
+/// the wide nodes, and thus the expected number of node visits of a random ray (Ylitie, Karras and
 /// Laine 2017, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*).
 struct CollapsePlan {
-    /// Division of the child slots of wide nodes. `splits[i][n - 1]`, n from 2 to 8, applies if the
-    /// subtree of the binary node i takes n slots of a wide node. It has the numbers of slots for
-    /// the two children of node i, or `[0, 0]` if node i itself takes one slot. `splits[i][0]`
-    /// applies if node i becomes a wide node, and divides the eight slots of this wide node.
+    /// Numbers of child slots of a wide node for the two children of each binary node i.
+    /// `splits[i][0]` applies if node i becomes a wide node, and divides its eight slots.
+    /// `splits[i][n - 1]`, n from 2 to 8, applies if the subtree of node i takes n slots of a wide
+    /// node above; `[0, 0]` means that node i itself takes one slot.
     splits: Vec<[[u8; 2]; BVH_WIDTH]>,
 }
 
 impl CollapsePlan {
-    /// Computes the optimal division of slots for each node of `binary`, children before parents.
+    /// Computes the optimal division of slots for each node of `binary`.
     fn new(binary: &BinaryBvh) -> Self {
         let nodes = &binary.nodes;
         let mut splits = vec![[[0; 2]; BVH_WIDTH]; nodes.len()];
-        // `costs[i][n - 1]` is the smallest sum of the areas of the wide nodes in the subtree of
-        // node i, if the subtree may take n slots of a wide node.
+        // `costs[i][n - 1]` is the smallest sum of the areas of wide nodes in the subtree of node
+        // i, if this subtree may take n slots of a wide node.
         let mut costs = vec![[0.0f32; BVH_WIDTH]; nodes.len()];
-        // Part of the cost of every wide node, so that wide nodes without area have a cost, too.
+        // Constant that is added to the area of every wide node, so that none is free of cost.
         let least_area = 1e-7 * nodes[0].aabb.half_area() + f32::MIN_POSITIVE;
         for number in binary.parents_first().into_iter().rev() {
             let node = &nodes[number];
@@ -232,7 +232,7 @@ mod tests {
     }
 
     /// Builds the hierarchy of `count` boxes with sides of 2 to 6 times `size`, and at most
-    /// `in_leaf` boxes in a leaf. Checks that every box is in exactly one leaf, and inside of all
+    /// `in_leaf` boxes in a leaf. Checks that every box is in exactly one leaf, and inside all
     /// nodes on the path to that leaf.
     fn check_build(count: usize, size: f32, in_leaf: usize) {
         check_family(|i| corners(i, size), count, in_leaf, BuildQuality::FAST);
@@ -346,7 +346,7 @@ mod tests {
     /// nearest neighbours alone takes quadratic time for most sets in [`FAMILIES`]: over a minute
     /// for 100,000 boxes.
     ///
-    /// cargo test --release --test scene -- --ignored --nocapture builds_of_coincident_boxes
+    /// cargo test --release --test kernel -- --ignored --nocapture builds_of_coincident_boxes
     #[test]
     #[ignore = "takes a minute, and needs an optimised build"]
     fn builds_of_coincident_boxes_take_linear_time() {

@@ -2,15 +2,15 @@
 //! Clustering for Bounding Volume Hierarchy Construction*), in O(n log n) for every input.
 //!
 //! A pass over the nodes, in the order of the Morton curve, merges every pair of nodes that are
-//! nearest to each other. If many distances are equal, such as between coincident boxes, boxes in a
-//! row or the triangles of a fan, a pass may find only one such pair. Passes that find few pairs
-//! are slow; in the end they merge neighbours on the curve instead.
+//! nearest to each other. A pass may find only one such pair if many distances are equal, as with
+//! coincident boxes, boxes in a row or the triangles of a fan. After [`PATIENT_VISITS`], passes
+//! that find few pairs merge neighbours on the curve instead.
 
 use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode};
 use crate::bvh::morton::morton_code;
 use glam::{DVec3, Vec3A};
 
-/// Number of node visits per primitive, summed over all passes, after which slow passes merge
+/// Number of node visits per primitive, summed over all passes, after which a slow pass merges
 /// neighbours on the Morton curve: the 1st and 2nd node, the 3rd and 4th, and so on. Boxes at
 /// random positions need 3 visits per primitive in total.
 const PATIENT_VISITS: usize = 8;
@@ -26,7 +26,7 @@ const NONE: u32 = u32::MAX;
 pub struct SearchWindow {
     /// Number of initial passes that search only the previous and the next node.
     pub narrow_passes: usize,
-    /// Number of nodes before and after each node that the other passes search.
+    /// Number of nodes on each side of a node that the later passes search.
     pub distance: usize,
 }
 
@@ -88,8 +88,8 @@ fn sorted_leaves(bounds: &[Aabb]) -> Vec<BinaryNode> {
 }
 
 /// Writes to `nearest` the nearest node of each node among the `distance` nodes before and after
-/// it: the one for which the box around both has the smallest surface area. Among equal areas, the
-/// last node counts.
+/// it: the one for which the box around both has the smallest surface area. Of several with equal
+/// areas, the last one counts.
 fn find_nearest(nodes: &[BinaryNode], distance: usize, nearest: &mut [Nearest]) {
     nearest.fill((f32::INFINITY, NONE));
     for (i, node) in nodes.iter().enumerate() {

@@ -1,7 +1,7 @@
-//! Packet BVH traversal with interval culling: a coherent packet is tested against the eight boxes
+//! Packet BVH traversal with interval culling. A coherent packet is tested against all eight boxes
 //! of a node at once, by interval bounds of its rays (Boulos, Wald and Shirley 2006, *Geometric and
-//! Arithmetic Culling Methods for Entire Ray Packets*). The individual rays are tested only against
-//! the boxes that pass. Single-ray traversal uses the same test, with bounds of one ray.
+//! Arithmetic Culling Methods for Entire Ray Packets*). Its rays are then tested only against boxes
+//! that pass. Single-ray traversal uses the same test, with the bounds of one ray.
 
 use crate::bvh::Ray;
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
@@ -59,14 +59,13 @@ pub struct PacketBounds<S> {
     pub near: [usize; 3],
     /// Rows of [`Bvh8Node::bounds`] with the box sides that the rays pass last, for each axis.
     pub far: [usize; 3],
-    /// Number subtracted from the near sides: the largest ray origin plus the padding for
-    /// directions that are positive on the axis, the smallest ray origin minus the padding for
-    /// negative ones.
+    /// Numbers subtracted from the near sides, one per axis. For positive directions: largest ray
+    /// origin plus the padding. For negative directions: smallest ray origin minus the padding.
     pub near_origin: [S; 3],
-    /// Number subtracted from the far sides: the smallest ray origin minus the padding for positive
-    /// directions, the largest ray origin plus the padding for negative ones.
+    /// Numbers subtracted from the far sides, one per axis. For positive directions: smallest ray
+    /// origin minus the padding. For negative directions: largest ray origin plus the padding.
     pub far_origin: [S; 3],
-    /// Smallest and largest reciprocals of the ray directions.
+    /// Smallest and largest reciprocals of the ray directions, one of each per axis.
     pub inverse: [[S; 3]; 2],
 }
 
@@ -152,14 +151,14 @@ pub fn broadcast<L: SimdFloat>(x: f32) -> L {
     L::splat(L::Scalar::from_f64(f64::from(x)))
 }
 
-/// Loads `WIDTH` of eight numbers, beginning with number `part * WIDTH`. If `WIDTH` is greater than
-/// 8, the numbers are repeated from the start.
+/// Loads one number per lane, from index `part * WIDTH` on. If `WIDTH` is greater than 8, the eight
+/// numbers are repeated.
 #[inline(always)]
 pub fn load_wide<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
     L::from_fn(|i| L::Scalar::from_f64(f64::from(numbers[(part * L::WIDTH + i) % BVH_WIDTH])))
 }
 
-/// Returns the bit mask of the lanes in which [`load_wide`] loads numbers without repetition.
+/// Returns the bit mask of the lanes that [`load_wide`] fills before it repeats numbers.
 #[inline(always)]
 pub const fn valid_lanes() -> u32 {
     (1 << BVH_WIDTH) - 1
@@ -191,9 +190,9 @@ pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     }
 }
 
-/// Pushes `entry` onto the stack, which has `top` entries. The entries from index `base` on,
-/// children of one node, stay sorted by descending distance, so that the nearest child is visited
-/// first.
+/// Pushes `entry` onto the stack, which has `top` entries. The entries from index `base` on are
+/// children of one node. They stay sorted by descending distance, so that the nearest child is
+/// visited first.
 #[inline(always)]
 fn push_sorted<S: Float>(
     stack: &mut [StackEntry<S>],

@@ -18,11 +18,11 @@ impl<L: SimdFloat> Ray<L> {
         self.direction.mul_add(t, self.origin)
     }
 
-    /// Returns `true` if the rays in the bit mask `lanes` are coherent, so that they traverse a BVH
-    /// faster as a packet than separately; `false` for fewer than two rays. Each ray is compared
-    /// with the first one in `lanes`. In a packet of w lanes, the difference of their unit
-    /// directions may have a length of at most w `turn`, and each coordinate of their origins may
-    /// differ by at most w `shift`.
+    /// Returns `true` if the rays in the bit mask `lanes` are coherent: a BVH traversal by the
+    /// packet is then faster than one by each ray. Returns `false` for fewer than two rays. Each
+    /// ray is compared with the first one. The difference of their unit directions may have a
+    /// length of at most `WIDTH * turn`, and each coordinate of their origins may differ by at most
+    /// `WIDTH * shift`.
     #[inline(always)]
     pub fn is_coherent(&self, lanes: u32, turn: f64, shift: f64) -> bool {
         if L::WIDTH == 1 || lanes.count_ones() < 2 {
@@ -50,8 +50,8 @@ pub struct Hit<L> {
 }
 
 impl<L: SimdFloat> Hit<L> {
-    /// Creates a packet without hits. `t` has the distance limits of the rays: [`Hit::keep_closer`]
-    /// and [`Hit::merge`] accept only hits closer than `t`. A negative `t` marks an inactive lane.
+    /// Creates a packet without hits. [`Hit::keep_closer`] and [`Hit::merge`] then accept only hits
+    /// closer than `t`. A negative `t` marks an inactive lane.
     #[inline(always)]
     pub fn with_t_max(t: L) -> Self {
         Self { t, primitive: L::from_id(0), triangle: L::from_id(0) }

@@ -2,8 +2,8 @@
 //! Bounding Volume Hierarchy Optimization*), with a bound on the number of node visits.
 //!
 //! A subtree moves to the place where the sum of all surface areas becomes smallest. The search for
-//! this place skips subtrees that cannot improve the sum. If boxes are nested, it cannot skip any
-//! and would visit all other nodes for each node, hence the bound.
+//! this place skips subtrees that cannot improve the sum. If boxes are nested, it can skip none,
+//! and each search would visit all nodes: hence the bound.
 
 use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode, sibling};
 
@@ -24,8 +24,8 @@ struct Search {
     /// Number of node visits left, over all searches.
     visits_left: usize,
     /// Candidates for the sibling of the moved subtree: a saving and a node. The saving is half of
-    /// the area that the removal of the subtree saves, minus half of the area by which its
-    /// insertion enlarges the candidate's ancestors.
+    /// the area saved by the removal of the subtree, minus half of the area by which its insertion
+    /// enlarges the candidate's ancestors.
     stack: Vec<(f32, u32)>,
 }
 
@@ -82,8 +82,8 @@ impl<'a> LinkedTree<'a> {
     }
 }
 
-/// Moves subtrees in 16 rounds. The first round searches for better places for the share `ratio` (0
-/// to 1) of all nodes: large ones near the root. Round n does so for 1/(2n - 1) times as many.
+/// Moves subtrees to better places, in 16 rounds. Round n, from 1, examines `ratio / (2n - 1)` of
+/// all nodes: large ones near the root. `ratio` is a share from 0 to 1.
 pub fn optimize(tree: &mut BinaryBvh, ratio: f32) {
     if ratio <= 0.0 || tree.nodes[0].is_leaf() {
         return;

@@ -13,9 +13,9 @@ use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn, prefe
 /// Node on a ray's stack, with the children that the ray enters and has not visited yet.
 #[derive(Clone, Copy, Default)]
 pub struct StackFrame {
-    /// Sort keys of the node's children: the bits of the distance at which the ray enters the
-    /// child, with the slot number in the last three bits. Slots without a child to visit have
-    /// [`NO_KEY`] or a larger key.
+    /// Sort key of each slot: the bits of the distance at which the ray enters the child, with the
+    /// slot number in the last three bits. A slot without a child to visit has [`NO_KEY`] or a
+    /// larger key.
     keys: [u32; BVH_WIDTH],
     node: u32,
     /// Number of children that the ray has still to visit.
@@ -39,11 +39,10 @@ struct RayTraversal<S> {
     frames: usize,
 }
 
-/// Traverses the hierarchy with each ray separately. Rays whose limit is not positive are inactive.
-/// Calls `leaf(lane, index, limit)` for each leaf whose box the ray of a lane enters within the
-/// ray's limit, from near to far. `leaf` returns the new limit of the ray. Before that, calls
-/// `prefetch_leaf(index)`; the other rays advance between both calls. `frames` has memory for one
-/// stack frame for each lane and level.
+/// Traverses the hierarchy with each ray separately, from near to far. For each leaf whose box the
+/// ray of a lane enters within its limit, calls `leaf(lane, index, limit)`, which returns the new
+/// limit. Before that, calls `prefetch_leaf(index)`; other rays advance in between. Rays whose
+/// limit is not positive are inactive. `frames` has one stack frame for each lane and level.
 #[inline(never)]
 pub fn traverse_rays<L: SimdFloat>(
     bvh: &Bvh8,
@@ -145,8 +144,8 @@ impl<S: Float> RayTraversal<S> {
             let (near, enters) = self.bounds.enters::<true, L>(side, L::splat(self.limit));
             let first = part * L::WIDTH;
             entered |= (enters.bits() & valid_lanes()) << first;
-            // The distance is reduced by more than the rounding error of the conversion to single
-            // precision, so that no child within the limit is skipped.
+            // The distance is reduced by more than the error of its rounding to single precision,
+            // so that no child within the limit is skipped.
             let near =
                 L::select(enters, near * L::from_f64(1.0 - 2e-7), L::from_f64(f64::INFINITY));
             for (i, key) in keys[first..].iter_mut().enumerate().take(L::WIDTH) {
@@ -167,8 +166,8 @@ impl<S: Float> RayTraversal<S> {
         true
     }
 
-    /// Continues with the nearest unvisited child within the limit, in the topmost frame that has
-    /// one. Returns `false` if no frame has one.
+    /// Continues with the nearest unvisited child within the limit, in the topmost frame with such
+    /// a child. Returns `false` if there is none.
     #[inline(always)]
     fn next(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         while self.frames > 0 {

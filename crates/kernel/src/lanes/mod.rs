@@ -89,7 +89,7 @@ macro_rules! float {
 float!(f32);
 float!(f64);
 
-/// Implements methods of SIMD traits by inherent methods of `$type`.
+/// Implements methods of SIMD traits as calls of inherent methods of `$type`.
 macro_rules! by_own_methods {
     ($type:ty: $($name:ident = $own:ident($($argument:ident),*) -> $result:ty),+ $(,)?) => {$(
         #[inline(always)]
@@ -165,7 +165,7 @@ pub trait SimdU32:
     fn reverse(self) -> Self;
 }
 
-/// SIMD vector of `WIDTH` floats; see the [module](self).
+/// SIMD vector of `WIDTH` floats. The [module](self) has a table of its instances.
 pub trait SimdFloat:
     Copy
     + Debug
@@ -184,7 +184,7 @@ pub trait SimdFloat:
     const WIDTH: usize;
     /// Name of the vector type for statistics and reports, such as `f32x8`.
     const NAME: &'static str;
-    /// See [`Float::EPSILON`].
+    /// Distance from 1 to the next larger number of a lane.
     const EPSILON: f64 = Self::Scalar::EPSILON;
     /// Largest finite number of the lanes.
     const MAX: f64;
@@ -284,7 +284,7 @@ pub trait SimdFloat:
     /// double precision returns the middle of one of 2^32 equal intervals.
     fn to_unit(bits: Self::SimdU32) -> Self;
 
-    /// Returns the sum of [`SimdFloat::fixed`] over all lanes.
+    /// Returns the sum of `round(lane * scale)` over all lanes; see [`SimdFloat::fixed`].
     fn fixed_sum(self, scale: f64) -> i64;
     /// Returns `round(lane * scale)` of each lane; array elements beyond the last lane are zero.
     /// `scale` must be a power of two, and `|lane * scale|` at most 2^49.

@@ -191,8 +191,8 @@ pub struct Frame<L> {
 impl<L: SimdFloat> Frame<L> {
     /// Builds a frame around the unit vector `n`, continuous in `n` except where `n.z` is 0. Around
     /// a horizontal vector (`n.y` is 0) the first tangent is horizontal and the second vertical,
-    /// and so are the sides of a reflection lobe with a square cross-section (Duff et al. 2017,
-    /// *Building an Orthonormal Basis, Revisited*, JCGT 6(1)).
+    /// which keeps the sides of square reflection lobes upright (Duff et al. 2017, *Building an
+    /// Orthonormal Basis, Revisited*, JCGT 6(1)).
     #[inline(always)]
     pub fn around(n: Vec3<L>) -> Self {
         let sign = L::one().copysign(n.z);

@@ -46,7 +46,7 @@ fn reverse_by_shifts<B: SimdU32 + Shl<u32, Output = B>>(x: B) -> B {
     x.shift_right(16) | (x << 16)
 }
 
-/// Returns a table for byte shuffles: the reversed bits of each 4-bit index, shifted by `SHIFT`.
+/// Returns a table for byte shuffles: bits of each 4-bit index reversed, then shifted by `SHIFT`.
 const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     let mut table = [0i8; 16];
     let mut n = 0;
@@ -57,8 +57,8 @@ const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     table
 }
 
-/// Reverses the bits of each lane: a table lookup reverses each nibble, then the bytes of each word
-/// are reversed.
+/// Reverses the bits of each lane. A table lookup reverses each group of four bits; then the bytes
+/// of each word are reversed.
 #[inline(always)]
 fn reverse8(x: u32x8) -> u32x8 {
     use wide::i8x32;

@@ -1,12 +1,12 @@
-//! Bounding volumes, which exclude primitives that rays cannot hit, in double precision, with a
-//! margin for the rounding errors of single precision.
+//! Bounding volumes, which exclude primitives that rays cannot hit. They are computed in double
+//! precision, with a margin for rays in single precision.
 
 use crate::primitive::canonical::{Bounds, HalfSpace};
 use crate::primitive::form::Form;
 use glam::{DVec2, DVec3};
 
-/// Bound of the displacement of a ray by rounding to single precision, as a fraction of the largest
-/// coordinate. The true displacement is a few times 2^-24.
+/// Upper bound of the displacement of a ray by rounding to single precision, as a fraction of the
+/// largest coordinate. The true displacement is a few times 2^-24.
 pub const F32_RAY_ERROR: f64 = 1e-5;
 
 /// Sphere that contains a form, a light, or the start points of camera rays.
@@ -37,9 +37,9 @@ impl LightTarget {
 /// All rays from one point (the apex) through a convex quadrilateral, and from all points of a lens
 /// around the apex.
 ///
-/// A ray from the apex with the direction d (component along `forward`: 1) and the ray from the lens
-/// point apex + o with the direction d - o / f meet at the depth f, `focus`. At the depth z the
-/// distance between them is |o (1 - z / f)|, which is largest at one end of an interval of depths.
+/// A ray from the apex has the direction d, with a component of 1 along `forward`. The ray from the
+/// lens point apex + o with the direction d - o / f meets it at the depth f. At the depth z their
+/// distance is |o (1 - z / f)|, which is largest at one end of an interval of depths.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
     /// Centre of the lens.
@@ -50,7 +50,7 @@ pub struct Frustum {
     pub corners: [DVec3; 4],
     /// Radius of the lens; 0 if all rays start at the apex.
     pub lens_radius: f64,
-    /// Depth f, greater than 0, at which rays through different points of the lens meet.
+    /// Depth f, greater than 0, at which rays through all points of the lens meet.
     pub focus: f64,
 }
 
@@ -206,8 +206,8 @@ impl BoundingVolume {
         Self { ball, slack: self.slack + by, ..self }
     }
 
-    /// Returns the height above the plane of this flat object below which rounding errors may let a
-    /// ray from or to `point` hit the object.
+    /// Returns the error of the height of `point` above the plane of this flat object. A ray from
+    /// or to a point within this height may hit the object.
     fn ray_error(&self, point: DVec3) -> f64 {
         let BoundingSphere { center, radius } = self.ball;
         let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
@@ -438,7 +438,7 @@ mod tests {
     }
 
     /// Checks the bounding ball of the part of a surface in a frustum: all points of the surface
-    /// inside of the frustum must also be inside of the ball.
+    /// inside the frustum must also be inside the ball.
     #[test]
     fn clipped_ball_holds_all_visible_points() {
         let mut random = 1u64;

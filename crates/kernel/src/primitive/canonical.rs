@@ -1,6 +1,6 @@
 //! Trait of all canonical forms, the stage between the description in the scene file and the
-//! compiled primitive. Each default is valid for every form; a form overrides it where it can give
-//! a closer result.
+//! compiled primitive. Default methods are valid for every form; a form overrides those for which
+//! it has a tighter result.
 
 use crate::primitive::bounding::BoundingSphere;
 use glam::{DAffine3, DMat3, DVec3};
@@ -143,12 +143,12 @@ pub trait CanonicalShape {
     /// geometry.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
-    /// Returns the projection for materials that do not choose one: planar for flat geometry.
+    /// Returns the projection for materials that choose none: `Box`, unless the form overrides it.
     fn default_mapping(&self) -> Projection {
         Projection::Box
     }
 
-    /// Returns simplified geometry for the search for gaps; none if there are too many details.
+    /// Returns proxies for the search for gaps. Geometry with too many details has none.
     fn proxies(&self) -> Vec<Proxy> {
         self.bounds().map(Proxy::around).into_iter().collect()
     }
@@ -186,9 +186,9 @@ pub fn bounds_of_points(points: &[DVec3]) -> Option<Bounds> {
     Some((low, high))
 }
 
-/// Implements [`CanonicalShape::normals_at`] for a convex solid. `sides` has, for each side, its
-/// outward normal and the height of the point above the side. The largest height counts as the
-/// distance between the point and the solid.
+/// Implements [`CanonicalShape::normals_at`] for a convex solid. `sides` has, for each side, the
+/// height of the point above it and its outward normal. The largest height counts as the distance
+/// between the point and the solid.
 pub fn normals_of_solid(sides: Vec<(f64, DVec3)>, slack: f64) -> Vec<Vec<DVec3>> {
     let near = sides.iter().all(|(height, _)| *height <= slack);
     let on = sides.into_iter().filter(|(height, _)| near && *height >= -slack);

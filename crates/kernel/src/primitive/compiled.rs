@@ -1,4 +1,4 @@
-//! Primitives compiled for the kernels of one SIMD type: what every kind implements.
+//! Traits of primitives that are compiled for one SIMD type, and points on their surfaces.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{SimdFloat, Vec3};
@@ -15,8 +15,8 @@ pub struct SurfacePoint<L> {
     pub max_coordinate: L,
 }
 
-/// Texture coordinates of a point, in repetitions of the image, and their gradients with respect to
-/// the position in texture space.
+/// Texture coordinates of a point. Their unit is one repetition of the image. The gradients are
+/// with respect to the position in texture space.
 #[derive(Clone, Copy, Debug)]
 pub struct TexCoord<L> {
     /// Coordinate to the right in the image.
@@ -48,10 +48,10 @@ pub trait Primitive<L: SimdFloat> {
     /// if there are none. Lanes outside `wanted` are undefined.
     fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask) -> Option<L::Mask>;
 
-    /// See [`Aggregate::surface`](crate::primitive::Aggregate::surface).
+    /// Projects `point` onto the surface; see [`surface`](crate::primitive::Aggregate::surface).
     fn surface(&self, triangle: L, point: Vec3<L>) -> SurfacePoint<L>;
 
-    /// See [`Aggregate::uv`](crate::primitive::Aggregate::uv).
+    /// Returns the primitive's own texture coordinates at `point`; `None` without any.
     fn uv(&self, triangle: L, point: Vec3<L>) -> Option<TexCoord<L>>;
 }
 

@@ -1,6 +1,6 @@
-//! Conical frusta (tapered cylinders, including cylinders and cones). Rays are transformed into the
-//! space of the canonical solid x^2 + y^2 <= (m + k z)^2, |z| <= 1/2. The origin is the middle of
-//! its axis, m is the radius there, and k is the slope.
+//! Conical frusta: tapered cylinders, including cylinders and cones. Rays are transformed into the
+//! space of the canonical solid x^2 + y^2 <= (m + k z)^2, |z| <= 1/2. Its origin is the middle of
+//! the axis, m is the radius there, and k is the slope.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -144,7 +144,7 @@ fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
     least
 }
 
-/// Conical frustum compiled for ray intersection. Matrices are stored by rows.
+/// Conical frustum compiled for ray intersection.
 #[derive(Clone, Copy)]
 pub struct ConicalFrustum<S> {
     /// Canonical space, whose origin is the middle of the axis.
@@ -242,7 +242,7 @@ struct SideCrossings<L: SimdFloat> {
 ///
 /// Let r be the frustum's radius at the height of p, and k the slope; p' and d' are p and d without
 /// their z coordinates. The line crosses the surface where a t^2 + 2 b t + c = 0. The discriminant
-/// is computed as |r d' - k d_z p'|^2 - (p' x d')^2. Unlike b^2 - a c, it does not cancel; for a
+/// b^2 - a c is computed as |r d' - k d_z p'|^2 - (p' x d')^2, which does not cancel; for a
 /// cylinder it compares the radius with the line's distance from the axis. The roots are q / a and
 /// c / q with q = -(b + sign(b) D), where D is the root of the discriminant. For a line parallel to
 /// a generator (a straight line on the lateral surface), a is 0; c / q stays finite.
@@ -276,7 +276,7 @@ fn side_crossings<L: SimdFloat>(
     let level = L::mask(true).and_not(has_roots) & a.abs().le(zero);
     let (all, none) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
     // Only the nappe with a positive radius belongs to the solid. A steep line crosses this nappe
-    // once: it enters there if the radius grows along the line, and leaves otherwise.
+    // once: it enters if the radius grows along the line, and leaves otherwise.
     let widens = kd.gt(zero);
     let enter = L::select(steep, L::select(widens, high, none), low);
     let leave = L::select(steep, L::select(widens, all, low), high);
@@ -292,7 +292,7 @@ fn side_crossings<L: SimdFloat>(
 #[inline(always)]
 fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3<L>, L) {
     let rho = x.mul_add(x, y * y).sqrt();
-    // The apex has no normal; the direction of the axis is used there.
+    // The tip of a cone has no normal; the direction of the axis is used there.
     let inverse = L::select(rho.gt(L::zero()), L::one() / rho, L::zero());
     let normal = Vec3::new(x * inverse, y * inverse, -L::splat(s.slope));
     (s.unit_space.scene_normal(normal), rho)

@@ -60,8 +60,8 @@ impl CanonicalShape for ConvexPolyhedronForm {
     }
 }
 
-/// Pair of parallel faces: the points p with low <= normal . (p - center) <= high, with `center` of
-/// [`ConvexPolyhedron`].
+/// Pair of parallel faces. The points p between them satisfy low <= normal . (p - center) <= high,
+/// with `center` of [`ConvexPolyhedron`].
 struct Slab<S> {
     normal: [S; 3],
     low: S,
@@ -162,7 +162,7 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for ConvexPolyhedron<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), meets))
     }
 
-    /// Projects onto the face above which `point` has the largest height.
+    /// Projects onto the face plane above which `point` has the largest signed height.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let from_center = point - Vec3::splat(self.center);

@@ -3,12 +3,12 @@
 //! rho^2 = x^2 + z^2.
 //!
 //! A line meets the torus where the height h = (rho - 1)^2 + y^2 - r^2 is 0, at most four times.
-//! Newton's method finds these zeros of h in brackets. Let s be the distance along the line from
-//! its point closest to the centre. Half the derivative of h is s - rho'(s). The graph of rho(s) is
-//! a hyperbola, whose second derivative exceeds 1 only between two known positions. These positions
-//! divide the line into three pieces. On each piece the derivative of h is monotone, so that it has
-//! one or three zeros in total. They bracket the zeros of h (after Yuksel 2022, *High-Performance
-//! Polynomial Root Finding for Graphics*).
+//! Newton's method finds these zeros of h inside brackets. Let s be the distance along the line
+//! from its point closest to the centre. Half the derivative of h is s - rho'(s). The graph of
+//! rho(s) is a hyperbola, and rho'' exceeds 1 only between two known positions. These divide the
+//! line into three pieces, on each of which h' is monotone. In total, h' has one or three zeros,
+//! which bracket the zeros of h (after Yuksel 2022, *High-Performance Polynomial Root Finding for
+//! Graphics*).
 //!
 //! The coefficients of the quartic polynomial with the same zeros are not used, because their terms
 //! would cancel for thin tubes.
@@ -172,7 +172,7 @@ struct Place<L> {
     beyond: L,
     /// Height above the plane of the ring.
     y: L,
-    /// Derivative of rho by the position.
+    /// Derivative of rho with respect to the position.
     speed: L,
     /// Reciprocal of rho.
     inward: L,
@@ -223,7 +223,7 @@ impl<L: SimdFloat> TorusLine<L> {
         Place { beyond: rho - L::one(), y: p.y, speed: speed.max(-limit).min(limit), inward }
     }
 
-    /// Returns h at position `s` of the line, and its derivative.
+    /// Returns the height h of the [module](self) at position `s` of the line, and its derivative.
     #[inline(always)]
     fn height(&self, s: L) -> (L, L) {
         let Place { beyond, y, speed, .. } = self.place(s);
@@ -232,7 +232,7 @@ impl<L: SimdFloat> TorusLine<L> {
         (height, slope + slope)
     }
 
-    /// Returns half of the slope of h at position `s` of the line, and the derivative of this half.
+    /// Returns half of the derivative of h at position `s` of the line, and the slope of this half.
     #[inline(always)]
     fn slope(&self, s: L) -> (L, L) {
         let Place { beyond, y, speed, inward } = self.place(s);

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 pub struct UnitSpace<S> {
     /// Origin of the space, in the scene.
     pub center: [S; 3],
-    /// Rows of the linear map.
+    /// Rows of the linear map from the scene to the space.
     rows: [[S; 3]; 3],
 }
 

@@ -41,14 +41,14 @@ pub struct SampleSettings {
     pub kind: SamplerKind,
 }
 
-/// Number of dimensions for a path's first choices between reflection and transmission: the last
-/// ones of the joint set. With indirect diffuse light, they serve the first diffuse bounce instead.
+/// Number of dimensions, the last ones of the joint set, for a path's first choices between
+/// reflection and transmission. With indirect diffuse light, the first diffuse bounce takes them.
 const CHOICES: u32 = 2;
 
-/// Largest number of surfaces on a path at which the sampled direction uses the joint set.
+/// Largest number of surfaces on a path whose sampled directions come from the joint set.
 const MAX_JOINT_LOBES: u32 = 2;
 
-/// Number of ways in which a packet can be divided among pixels, with 2^k samples of each pixel.
+/// Number of ways to divide a packet among pixels: 2^k samples of each pixel for each k.
 const PACKET_SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
 
 /// Random positions that camera rays use. Each takes two dimensions, starting with dimension 0.
@@ -69,14 +69,14 @@ pub struct Sampler<L: SimdFloat> {
     lens: usize,
     /// First dimension of the direction sampled at a path's first surface.
     first_lobe: usize,
-    /// Number of surfaces on a path at which the sampled direction uses the joint set.
+    /// Number of surfaces on a path whose sampled directions come from the joint set.
     joint_lobes: u32,
-    /// `low_bits[k][d]` holds the points 0..2^k in dimension d, repeated over the lanes, for
-    /// packets with 2^k samples of each pixel.
+    /// Table `low_bits[k][d]`: Sobol points 0 to 2^k - 1 in dimension d, repeated over the lanes,
+    /// for packets with 2^k samples of each pixel.
     low_bits: [[L::SimdU32; DIMENSIONS]; PACKET_SHAPES],
     /// Lane indices 0, 1, 2 and so on.
     ramp: L::SimdU32,
-    /// Hash constant of each dimension.
+    /// Constant of each dimension that is hashed with the key, so that scramblings differ.
     dimension_salt: [u32; DIMENSIONS],
 }
 
@@ -119,8 +119,8 @@ impl<L: SimdFloat> Sampler<L> {
     pub fn block(&self, first: u32, count: usize) -> SampleBlock<'_, L> {
         debug_assert!(count.is_power_of_two() && count <= L::WIDTH);
         debug_assert!((first as usize).is_multiple_of(count));
-        // For a `first` that is a multiple of `count`, a power of two, Sobol point `first + i` is
-        // point `first` XOR point i.
+        // Sobol point `first + i` is point `first` XOR point i, because `first` is a multiple of
+        // `count`, a power of two.
         let low_bits = &self.low_bits[count.ilog2() as usize];
         let point = |d| L::SimdU32::splat(sobol::point(d, first)) ^ low_bits[d];
         let owen_prefix = array_from_fn(|d| owen_scramble_prefix(point(d)));
@@ -139,21 +139,21 @@ impl<L: SimdFloat> Sampler<L> {
 }
 
 impl<L: SimdFloat> SampleBlock<'_, L> {
-    /// Creates the sampler of a packet with samples of the pixel with the [`Sampler::key`] `key`.
+    /// Creates the sampler of a packet of one pixel, whose [`Sampler::key`] is `key`.
     #[inline(always)]
     pub fn for_pixel(&self, key: u32) -> PacketSampler<'_, L> {
         PacketSampler { single_key: Some(key), ..self.for_pixels(L::SimdU32::splat(key)) }
     }
 
-    /// Creates the sampler of a packet with samples of several pixels, with the key of each lane.
+    /// Creates the sampler of a packet of several pixels. `keys` has the key of each lane's pixel.
     #[inline(always)]
     pub fn for_pixels(&self, keys: L::SimdU32) -> PacketSampler<'_, L> {
         PacketSampler { points: self, key: keys, single_key: None, first_lobe: 0, first_choice: 0 }
     }
 }
 
-/// Number of sampled directions, and of choices, for which each *segment* of a path has random
-/// numbers of its own. Diffuse bounces divide a path into segments.
+/// Number of sampled directions, and number of choices, that have random numbers of their own in
+/// each *segment* of a path. Diffuse bounces divide a path into segments.
 const PER_GENERATION: u32 = 1 << 16;
 
 /// Number of the first choice of a reservoir. Smaller numbers belong to choices between reflection
@@ -194,7 +194,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns a random number in [0, 1) for candidate `number` of a reservoir.
+    /// Returns a random number in [0, 1) for candidate `number` of a resampling reservoir.
     #[inline(always)]
     pub fn reservoir_1d(&self, number: u32) -> L {
         self.padded_choice(RESERVOIR + self.first_choice + number)
@@ -223,22 +223,22 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Returns two random numbers in [0, 1) for a point on emitter `light`, as seen from the
     /// surface that a path hits after `bounce` reflections.
     ///
-    /// The numbers use the dimensions of [`Self::lobe_2d`] with another scrambling. Lobe and
-    /// emitter may share dimensions, because their light is added, never multiplied.
+    /// The numbers are those of [`Self::lobe_2d`] with another scrambling. Lobe and emitter may
+    /// share dimensions, because their light is added, never multiplied.
     #[inline(always)]
     pub fn light_2d(&self, bounce: u32, light: u32) -> (L, L) {
         self.pair_2d(bounce, hash_scalar(light + 1))
     }
 
-    /// Returns a random number in [0, 1) for the choice of a set of point and spot lights, at the
-    /// surface that a path hits after `bounce` reflections. It uses a dimension of
-    /// [`Self::light_2d`] with a scrambling of its own.
+    /// Returns a random number in [0, 1) for the choice among sets of point and spot lights, at the
+    /// surface that a path hits after `bounce` reflections. The number is one of [`Self::light_2d`]
+    /// with another scrambling.
     #[inline(always)]
     pub fn light_choice_1d(&self, bounce: u32) -> L {
         self.light_2d(bounce, u32::MAX - 1).0
     }
 
-    /// Returns the random numbers for the surface after `bounce` reflections, scrambled with
+    /// Returns the two random numbers for the surface after `bounce` reflections, scrambled with
     /// `salt`.
     #[inline(always)]
     fn pair_2d(&self, bounce: u32, salt: u32) -> (L, L) {

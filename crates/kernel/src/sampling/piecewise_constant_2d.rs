@@ -44,8 +44,8 @@ impl PiecewiseConstant2D {
         let luminance = |p: &[f32; 3]| {
             0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])
         };
-        // Mean, over the middle one of three neighbouring pixels on one axis, of the function that
-        // interpolates linearly between the centres of the three.
+        // Mean, over the middle one of three neighbouring pixels, of the linear interpolation
+        // between the centres of the three.
         let smoothed =
             |before: f64, middle: f64, after: f64| 0.125 * before + 0.75 * middle + 0.125 * after;
         let along_row = |row: usize| -> Vec<f64> {
@@ -150,8 +150,8 @@ fn cumulative(weights: &[f64], total: f64) -> impl Iterator<Item = f64> {
     std::iter::once(0.0).chain(weights.iter().enumerate().map(partial))
 }
 
-/// Returns the index of the last of the ascending `numbers` for which `is_below` is `true`, from 0
-/// to the second-last index.
+/// Returns the index of the last one of the ascending `numbers` for which `is_below` is `true`,
+/// clamped to the range from 0 to the second-last index.
 fn interval<T>(numbers: &[T], is_below: impl Fn(&T) -> bool) -> usize {
     numbers.partition_point(is_below).clamp(1, numbers.len() - 1) - 1
 }

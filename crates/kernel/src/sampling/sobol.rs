@@ -44,7 +44,7 @@ const fn column(pair: usize, bit: usize) -> u32 {
     diagonal | (hash_scalar((32 * (pair - 1) + bit) as u32) & (diagonal - 1))
 }
 
-/// Returns direction number `bit` of the Sobol sequence in dimension 0 or 1.
+/// Returns direction number `bit` of the first two dimensions of the Sobol sequence, 0 and 1.
 const fn direction(dimension: usize, bit: usize) -> u32 {
     let mut row = 1 << bit;
     if dimension == 1 {
@@ -76,8 +76,8 @@ const fn directions(dimension: usize) -> [u32; 32] {
 
 type Tables = [[[u32; 256]; 4]; DIMENSIONS];
 
-/// Lookup tables of Sobol points: `TABLES[d][k][byte]` is the contribution (XOR) of byte k of the
-/// index to dimension d.
+/// Lookup tables of Sobol points. `TABLES[d][k][byte]` is XORed into dimension d of the point if
+/// byte k of its index is `byte`.
 static TABLES: Tables = {
     let mut tables = [[[0u32; 256]; 4]; DIMENSIONS];
     let mut d = 0;

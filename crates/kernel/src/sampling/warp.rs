@@ -1,5 +1,5 @@
 //! Sample warps: maps from the unit square to directions in a local frame, with their densities.
-//! The z axis is the lobe's axis. Warps to microfacet normals are beside the microfacets.
+//! The z axis is the axis of the lobe. Warps to microfacet normals are in `zerkalo-scene`.
 
 use crate::lanes::{SimdFloat, Vec3, polynomial};
 use std::f64::consts::{FRAC_PI_4, TAU};
@@ -19,8 +19,8 @@ pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
     (far * L::select(wide, c, s), far * L::select(wide, s, c), far * far)
 }
 
-/// Returns the coefficients of sin(pi x / 4) / x for `first` = 1, and of cos(pi x / 4) for `first`
-/// = 0, as power series in x^2.
+/// Returns the coefficients of a power series in x^2: of sin(pi x / 4) / x if `first` is 1, of
+/// cos(pi x / 4) if `first` is 0.
 const fn series(first: u32) -> [f64; 8] {
     let mut terms = [0.0; 8];
     let (mut k, mut n, mut term) = (0, 0, 1.0);
@@ -66,8 +66,8 @@ pub fn cosine_hemisphere<L: SimdFloat>(u: L, v: L) -> Vec3<L> {
 }
 
 /// Returns the density [1/sr] of [`cone`] around the unit vector `axis` at `direction`: constant
-/// inside of the cone, 0 outside. `direction` is inside if |direction - axis|^2 <= 2
-/// `one_minus_cos`. In narrow cones this comparison is more exact than one of cosines.
+/// inside the cone, 0 outside. `direction` is inside if |direction - axis|^2 <= 2 `one_minus_cos`.
+/// In narrow cones this comparison is more exact than one of cosines.
 #[inline(always)]
 pub fn cone_pdf<L: SimdFloat>(axis: Vec3<L>, direction: Vec3<L>, one_minus_cos: L) -> L {
     let drop = (direction - axis).length_squared() * L::from_f64(0.5);
@@ -82,7 +82,7 @@ pub fn square<L: SimdFloat>(u: L, v: L, side: L) -> Vec3<L> {
     Vec3::new((u - half) * side, (v - half) * side, L::one()).normalize()
 }
 
-/// Returns the density [1/sr] of [`square`] at `direction`: 1 / (side^2 cos^3(theta)) inside of the
+/// Returns the density [1/sr] of [`square`] at `direction`: 1 / (side^2 cos^3(theta)) inside the
 /// square, 0 outside. Here theta is the angle between `direction` and z.
 #[inline(always)]
 pub fn square_pdf<L: SimdFloat>(direction: Vec3<L>, side: L) -> L {

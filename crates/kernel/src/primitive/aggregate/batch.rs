@@ -82,7 +82,7 @@ macro_rules! batches {
 }
 
 // Kinds of compiled primitives, in the order in which primitives are numbered. A form of the kinds
-// after `parts` becomes several primitives, or none. A new kind needs a word here.
+// after `parts` becomes several primitives, or none. A new kind is added here.
 batches! {
     Parallelogram, Plane, Sphere, Ellipsoid, ConvexPolyhedron, ConicalFrustum, Torus;
     parts: Csg(CompoundPart), Mesh(MeshInstance)
@@ -125,13 +125,13 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
         occluded
     }
 
-    /// See [`Aggregate::surface`](super::Aggregate::surface).
+    /// Projects `point` onto the surface of primitive `primitive` of the batch.
     #[inline(always)]
     pub fn surface(&self, primitive: usize, triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
         each!(self, primitives => Primitive::surface(&primitives[primitive], triangle, point))
     }
 
-    /// See [`Aggregate::uv`](super::Aggregate::uv).
+    /// Returns the texture coordinates that primitive `primitive` of the batch defines, if any.
     pub fn uv(&self, primitive: usize, triangle: L, point: Vec3<L>) -> Option<TexCoord<L>> {
         each!(self, primitives => Primitive::uv(&primitives[primitive], triangle, point))
     }
@@ -142,8 +142,8 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
 pub struct PrimitiveId {
     /// Index of the canonical form in the list given to the aggregate.
     pub form: usize,
-    /// Number of the part if the form is a compound; otherwise 0. Part 0 stands for the whole
-    /// compound; the other parts are not intersected on their own.
+    /// Number of the part of a CSG compound; otherwise 0. Rays are intersected with part 0 only,
+    /// which stands for the whole compound.
     pub part: usize,
 }
 
@@ -158,8 +158,8 @@ pub struct LabelledBatch<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> LabelledBatch<L> {
-    /// Compiles into one batch the `forms` for which `compile` returns primitives; `None` without
-    /// any.
+    /// Compiles the `forms` for which `compile` returns primitives into one batch; `None` if there
+    /// are none.
     fn new<P, I: IntoIterator<Item = P>>(
         forms: &[Form],
         compile: impl Fn(&Form) -> Option<I>,

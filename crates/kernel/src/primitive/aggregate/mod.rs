@@ -43,15 +43,14 @@ pub enum AccelerationStructure {
 }
 
 impl AccelerationStructure {
-    /// Returns the faster structure by measurement, a BVH or a list: see [`BVH_MIN_PRIMITIVES`].
+    /// Returns the faster structure: a BVH from [`BVH_MIN_PRIMITIVES`] on, otherwise a list.
     pub fn fastest(forms: &[Form]) -> Self {
         let bounded = forms.iter().filter(|form| form.bounds().is_some()).count();
         if bounded >= BVH_MIN_PRIMITIVES { Self::Bvh } else { Self::List("list") }
     }
 }
 
-/// Batch of an aggregate. The numbers of its primitives in the aggregate are from `base` up to, but
-/// not including, `end`.
+/// Batch of an aggregate. Its primitives have the numbers `base..end` in the aggregate.
 struct BatchRange<L: SimdFloat> {
     batch: PrimitiveBatch<L>,
     base: u32,
@@ -68,7 +67,7 @@ pub struct Aggregate<L: SimdFloat> {
     /// Bounding box of each primitive; `None` for an infinite primitive. Empty if no boxes are
     /// used.
     boxes: Vec<Option<PrimitiveBox<L::Scalar>>>,
-    /// Origin of each primitive.
+    /// Form, and its part, from which each primitive was compiled.
     pub sources: Vec<PrimitiveId>,
     /// Number and kinds of the primitives, and how rays find them, such as `2 spheres (list)`.
     pub description: String,
@@ -143,7 +142,7 @@ impl<L: SimdFloat> Aggregate<L> {
         Self { batches, all, bvh, in_bvh, boxes, sources, description }
     }
 
-    /// Returns the set of all primitives in the BVH, and of those outside it that `wanted` accepts.
+    /// Returns the set of the BVH's primitives, and of the others whose number `wanted` accepts.
     pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
         let mut ranges: Vec<(usize, Range<usize>)> = Vec::new();
         for (index, range) in &self.all.ranges {
@@ -209,7 +208,7 @@ impl<L: SimdFloat> Aggregate<L> {
         self.closest_masked(ray, set, L::mask(true))
     }
 
-    /// Returns the result of [`Aggregate::closest`] in the lanes of `wanted`; other lanes are
+    /// Returns the result of [`Aggregate::closest`] in the lanes of `wanted`. Other lanes are
     /// undefined.
     #[inline(always)]
     pub fn closest_masked(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
@@ -336,8 +335,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns the lanes of `wanted` whose ray hits the primitive with the index `number` in
-    /// [`Aggregate::in_tree`] at a distance between 0 and `limit`.
+    /// Returns the lanes of `wanted` whose ray hits a primitive of the BVH at a distance between 0
+    /// and `limit`. `number` is the index of the primitive in [`Aggregate::in_tree`].
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (index, i) = self.in_bvh[number as usize];
@@ -396,20 +395,19 @@ impl<L: SimdFloat> Aggregate<L> {
         meshes.get((primitive as usize).checked_sub(first)?)
     }
 
-    /// Returns `true` if some primitive has interpolated normals; see
-    /// [`Aggregate::shading_normal`].
+    /// Returns `true` if some primitive interpolates the normals of its vertices.
     pub fn is_smooth(&self) -> bool {
         self.meshes().iter().any(|mesh| mesh.smooth)
     }
 
-    /// Returns `true` if some primitive has vertex or face colours; see [`Aggregate::color`].
+    /// Returns `true` if some primitive has colours of vertices or faces.
     pub fn is_colored(&self) -> bool {
         self.meshes().iter().any(MeshInstance::is_colored)
     }
 
-    /// Returns the shading normal of `primitive` at a hit point. `at` has the hit point and the
-    /// geometric normal on the viewer's side. `direction` is the direction of the rays. The result
-    /// is less than 90 degrees away from the geometric normal and from the direction to the viewer.
+    /// Returns the shading normal of `primitive` at the surface point `at`, whose normal is on the
+    /// viewer's side. `direction` is the direction of the rays. The result is less than 90 degrees
+    /// away from the geometric normal and from the direction to the viewer.
     pub fn shading_normal(
         &self,
         primitive: u32,

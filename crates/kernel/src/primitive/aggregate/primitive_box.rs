@@ -1,5 +1,5 @@
-//! Bounding boxes of single primitives, axis-aligned or oriented, which rays are tested against
-//! before the primitive's own intersection.
+//! Bounding boxes of single primitives, axis-aligned or oriented. A ray is tested against the box
+//! before the primitive.
 
 use crate::bvh::Ray;
 use crate::bvh::packet::SlabPacket;
@@ -19,16 +19,16 @@ pub struct PrimitiveBox<S> {
 /// Object space of an oriented bounding box, whose origin is the centre of the box.
 struct BoxFrame<S> {
     unit_space: UnitSpace<S>,
-    /// Sum of the magnitudes in each row of the map to object space: the largest factor by which
-    /// this map enlarges rounding errors along the axis of the row.
+    /// Largest factor by which the map to object space enlarges rounding errors along each axis:
+    /// the sum of the magnitudes in the matrix row of this axis.
     growth: [S; 3],
     /// Largest magnitude of a coordinate of the primitive in the scene.
     reach: S,
 }
 
-/// Returns the corners of a bounding box, moved outward by 4 times the largest coordinate times
-/// `epsilon`, the relative rounding error. The margin covers the rounding errors of the box and of
-/// the primitive's own intersection test.
+/// Returns the corners of a bounding box, moved outward by 4 `epsilon` times the largest
+/// coordinate. `epsilon` is the relative rounding error. The margin covers the errors of the box
+/// and of the primitive's own intersection test.
 pub fn padded((low, high): Bounds, epsilon: f64) -> [DVec3; 2] {
     let reach = low.abs().max(high.abs()).max_element();
     let pad = DVec3::splat(reach * 4.0 * epsilon);
@@ -36,8 +36,8 @@ pub fn padded((low, high): Bounds, epsilon: f64) -> [DVec3; 2] {
 }
 
 /// Rounding error of a bounding box in double precision, as a fraction of the largest coordinate.
-/// Far from the origin of the scene file, a solid may extend beyond its box by this error, because
-/// both are rounded differently.
+/// Far from the scene file's origin, a solid may extend beyond its box by this error, because box
+/// and solid are rounded separately.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> PrimitiveBox<S> {
@@ -74,8 +74,8 @@ impl<S: Float> PrimitiveBox<S> {
                 SlabPacket::new(ray, Vec3::new(pad, pad, pad))
             }
             Some(space) => {
-                // Bound of the rounding errors of the ray's origin, of its direction and of the
-                // box's centre, in scene units.
+                // Upper bound, in scene units, of the rounding errors of the ray's origin and
+                // direction, and of the box's centre.
                 let lost = (far + L::splat(space.reach)) * L::from_f64(64.0 * L::EPSILON);
                 SlabPacket::new(&space.unit_space.ray(ray), Vec3::splat(space.growth) * lost)
             }

@@ -9,15 +9,14 @@ use crate::primitive::aggregate::primitive_box::padded;
 use crate::primitive::canonical::Bounds;
 use glam::DVec3;
 
-/// Coherence limit for [`Ray::is_coherent`]. Divided by the square root of the number of
-/// primitives, it is the largest difference of unit directions. This quotient times the extent of
-/// the primitives is the largest difference of origins.
+/// Coherence limit of a BVH with one primitive. With n primitives, the argument `turn` of
+/// [`Ray::is_coherent`] is this limit divided by sqrt(n), and `shift` is `turn` times the extent of
+/// the primitives.
 ///
 /// Measured with spheres inside a large ball and packets of eight rays. A packet is as fast as
-/// single rays if its differences are 0.8 with 256 spheres, 0.4 with 1000 and 0.13 with 10,000.
-/// With 100 spheres, even packets of random rays are as fast as single rays. For packets of four
-/// rays, the differences at which packets and single rays are equally fast are at most half as
-/// large.
+/// single rays if its directions differ by 0.8 with 256 spheres, 0.4 with 1000 and 0.13 with
+/// 10,000. With 100 spheres, even packets of random rays are as fast as single rays. For packets of
+/// four rays, these differences are at most half as large.
 const COHERENCE_LIMIT: f64 = 1.5;
 
 /// BVH over the primitives of a scene, one primitive per leaf.
@@ -25,9 +24,9 @@ pub struct SceneBvh {
     boxes: Bvh8,
     /// Primitive in each leaf of the BVH, as its index in the list given to [`SceneBvh::new`].
     primitives: Vec<u32>,
-    /// Argument `turn` of [`Ray::is_coherent`].
+    /// Largest difference of unit directions divided by `WIDTH`: `turn` of [`Ray::is_coherent`].
     turn: f64,
-    /// Argument `shift` of [`Ray::is_coherent`].
+    /// Largest difference of origins divided by `WIDTH`: `shift` of [`Ray::is_coherent`].
     shift: f64,
 }
 

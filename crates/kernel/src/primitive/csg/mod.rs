@@ -63,7 +63,7 @@ struct Compound<S> {
     reach: S,
     parts: Vec<Part<S>>,
     ops: Vec<Op>,
-    /// Largest number of spans of one line in all parts.
+    /// Largest number of spans of one line, summed over all parts.
     spans: usize,
     /// Largest number of entries on the stack of the instructions.
     depth: usize,

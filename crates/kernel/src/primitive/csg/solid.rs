@@ -98,7 +98,7 @@ macro_rules! solids {
                 }
             }
 
-            /// See [`AnalyticPrimitive::surface`].
+            /// Projects `point` onto the solid, as [`AnalyticPrimitive::surface`] does.
             #[inline(always)]
             pub fn surface<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> SurfacePoint<L> {
                 match self {
@@ -106,7 +106,7 @@ macro_rules! solids {
                 }
             }
 
-            /// See [`AnalyticPrimitive::uv`].
+            /// Returns the solid's own texture coordinates at `point`; `None` without any.
             pub fn uv<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> Option<TexCoord<L>> {
                 match self {
                     $(Self::$kind(solid) => solid.uv(point),)+
@@ -116,7 +116,7 @@ macro_rules! solids {
     };
 }
 
-// Kinds of solids, each with the largest number of spans of one line; then forms that are no
+// Kinds of solids, each with the largest number of spans of one line; then forms that are not
 // solids.
 solids! {
     Sphere(SphereForm, 1),

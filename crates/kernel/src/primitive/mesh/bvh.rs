@@ -1,4 +1,4 @@
-//! BVH over the triangles of a mesh. A leaf has up to eight triangles in structure-of-arrays layout. A
+//! BVH over the triangles of a mesh. A leaf has up to eight triangles as a structure of arrays. A
 //! single ray is intersected with all eight at once, a packet with one triangle after the other.
 
 use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
@@ -100,8 +100,8 @@ impl Mesh {
         )
     }
 
-    /// Returns the least value of `of_triangle` over all triangles. `lower_bound` returns a number
-    /// that is not above the value of any triangle in a box.
+    /// Returns the least value of `of_triangle` over all triangles. `lower_bound` returns a lower
+    /// bound of the values of all triangles in a box.
     pub fn least(
         &self,
         lower_bound: impl Fn(Bounds) -> f64,

@@ -199,7 +199,7 @@ impl<S: Float> MeshInstance<S> {
         (Ray { origin: self.point(ray.origin), direction }, length)
     }
 
-    /// Returns a vertex attribute of `N` numbers at the three vertices of the triangle
+    /// Returns a vertex attribute of `N` numbers at the three vertices of the triangle with the id
     /// `triangle_tag`.
     #[inline(always)]
     fn attribute<const N: usize, L: SimdFloat<Scalar = S>>(
@@ -312,7 +312,7 @@ impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
     #[inline(never)]
     fn surface(&self, triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
         let triangle = self.triangle(triangle);
-        // The scaled normal has a squared length that neither overflows nor vanishes.
+        // The normal is scaled so that its squared length neither overflows nor vanishes.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());
@@ -342,7 +342,7 @@ impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
 }
 
 impl<S: Float> MeshInstance<S> {
-    /// See [`Aggregate::shading_normal`](crate::primitive::Aggregate::shading_normal).
+    /// Returns the normal at `at`, interpolated and bent towards the viewer if the mesh is smooth.
     #[inline(never)]
     pub fn shading_normal<L: SimdFloat<Scalar = S>>(
         &self,
@@ -362,7 +362,7 @@ impl<S: Float> MeshInstance<S> {
         keep_visible(smooth, at.normal, direction)
     }
 
-    /// See [`Aggregate::color`](crate::primitive::Aggregate::color).
+    /// Returns the colour of `triangle` in the mesh file; `None` if the file has no colours.
     #[inline(never)]
     pub fn color<L: SimdFloat<Scalar = S>>(&self, triangle: L) -> Option<Vec3<L>> {
         let mesh = &self.mesh.mesh;

@@ -12,17 +12,17 @@ use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 use crate::primitive::mesh::{Mesh, TriangleBlock};
 
-/// Coherence limit for [`Ray::is_coherent`]. Divided by the square root of the number of triangles,
-/// it is the largest difference of unit directions. This quotient times the size of the mesh is the
-/// largest difference of origins.
+/// Coherence limit of a mesh with one triangle. With n triangles, the argument `turn` of
+/// [`Ray::is_coherent`] is this limit divided by sqrt(n), and `shift` is `turn` times the size of
+/// the mesh.
 ///
 /// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight rays are faster than
 /// single rays up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million.
 /// For packets of four rays, these limits are at most half as large.
 const COHERENCE_LIMIT: f64 = 2.5;
 
-/// Upper limit of the quotient of [`COHERENCE_LIMIT`] and the square root of the number of
-/// triangles. It takes effect for meshes of fewer than about 3900 triangles.
+/// Upper limit of `turn` of [`Ray::is_coherent`]. It takes effect for meshes of fewer than about
+/// 3900 triangles.
 const MAX_COHERENT_SPREAD: f64 = 0.04;
 
 /// Closest hit of each ray with the triangles of a mesh.
@@ -34,16 +34,15 @@ pub struct TriangleHit<L> {
     pub triangle: L,
 }
 
-/// Rays of a packet, or one ray repeated in every lane, with the frame of the watertight triangle
-/// test.
+/// Rays with the frames of the watertight triangle test: the rays of a packet, or one ray repeated
+/// in every lane.
 #[derive(Clone, Copy)]
 struct ShearedRay<L> {
     origin: Vec3<L>,
     frame: Frame<L>,
 }
 
-/// Returns the packet for tests of boxes that are enlarged by the rounding errors of the triangle
-/// tests.
+/// Prepares slab tests that enlarge boxes by the rounding errors of the triangle tests.
 #[inline(always)]
 fn slab_packet<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
     let [low, high] = mesh.mesh.bounds;
@@ -99,8 +98,8 @@ impl<L: SimdFloat> ShearedRay<L> {
         (t, (left | right) & t.gt(zero))
     }
 
-    /// Returns the corners of consecutive triangles of a leaf, one triangle per lane. The first
-    /// triangle has the index `part` times the number of lanes.
+    /// Returns the corners of consecutive triangles of a leaf, one triangle per lane. The first one
+    /// has the index `part` times the number of lanes.
     #[inline(always)]
     fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
@@ -175,8 +174,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         found
     }
 
-    /// Traverses the mesh's BVH with the packet as a whole if it is coherent, otherwise by each
-    /// ray.
+    /// Traverses the mesh's BVH with the packet as a whole if it is coherent, otherwise with each
+    /// ray separately.
     #[inline(always)]
     fn run<L: SimdFloat>(&self, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
         let packet = slab_packet(ray, self.mesh);

@@ -35,7 +35,7 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// Passes all data of the mesh that affects pictures to `update`, in pieces, for a hash.
+    /// Passes all data of the mesh that affects pictures to `update`, piece by piece, to be hashed.
     pub fn hash_contents(&self, mut update: impl FnMut(&[u8])) {
         let Self {
             positions,
