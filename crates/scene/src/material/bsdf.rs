@@ -18,7 +18,7 @@ const SHARP_EXPONENT: f64 = 1024.0;
 pub enum SpecularModel<S> {
     /// No highlights.
     None,
-    /// Phong's model: k_s (R.V)^alpha / pi.
+    /// Phong's model: k_s (R.V)^alpha / pi, with mirrored light direction R and view direction V.
     Phong {
         /// Specular coefficient k_s.
         strength: S,
@@ -27,7 +27,7 @@ pub enum SpecularModel<S> {
         /// `true` if alpha exceeds `SHARP_EXPONENT`.
         sharp: bool,
     },
-    /// Microfacet model: k_s D G F / (4 N.L N.V).
+    /// Microfacet model: k_s D G F / (4 N.L N.V), with distribution D, masking G and Fresnel F.
     Microfacet {
         /// Specular coefficient k_s.
         strength: S,
@@ -72,9 +72,9 @@ impl<S> ReflectionLobe<S> {
 pub struct Transmission<S> {
     /// Transmission coefficient k_t.
     pub strength: S,
-    /// Index of refraction inside of the solid that the surface bounds.
+    /// Index of refraction inside the solid that the surface bounds.
     pub index: S,
-    /// Absorption coefficients [1 / scene unit] inside of the solid; 0 absorbs nothing.
+    /// Absorption coefficients [1 / scene unit] inside the solid; 0 absorbs nothing.
     pub absorption: [S; 3],
     /// `true` if Fresnel's equations split the light; `false` if k_r and k_t alone are the weights.
     pub dielectric: bool,
@@ -351,8 +351,8 @@ impl<S: Float> Bsdf<S> {
     }
 
     /// Samples the reflection at a visible microfacet of `facets`. The weight of directions below
-    /// the surface is 0, because G is zero there. For other directions it is f N.L / density = k_r
-    /// F G / G_1.
+    /// the surface is 0, because G is zero there. For other directions it is the BSDF times N.L /
+    /// density, which is k_r F G / G_1.
     #[inline(always)]
     fn sample_microfacet<L: SimdFloat<Scalar = S>>(
         &self,

@@ -88,8 +88,8 @@ impl<S: Float> Reflectance<S> {
     }
 
     /// Returns the reflectance of a colour channel at the cosine `c` by Cook and Torrance's form of
-    /// Fresnel's equations, with n the index of refraction: F = 1/2 ((g - c) / (g + c))^2 (1 + ((c
-    /// (g + c) - 1) / (c (g - c) + 1))^2), g^2 = n^2 + c^2 - 1.
+    /// Fresnel's equations: 1/2 A^2 (1 + B^2), with A = (g - c) / (g + c), B = (c (g + c) - 1) / (c
+    /// (g - c) + 1) and g^2 = n^2 + c^2 - 1. n is the index of refraction.
     #[inline(always)]
     fn exact<L: SimdFloat<Scalar = S>>(&self, c: L, channel: usize) -> L {
         if self.total[channel] {

@@ -15,16 +15,16 @@ use zerkalo_kernel::primitive::{Projection, TexCoord};
 /// end of the shape do not move v past the edge of the image.
 const RIM: f64 = 1.0 / 16_384.0;
 
-/// Factor that favours the later of two axes (in the order x, y, z) at equal angles to the normal,
-/// when a box projection chooses the side of the box.
+/// Factor that favours the later of the axes x, y and z at equal angles to the normal, when a box
+/// projection chooses a side of the box.
 const TIE: f64 = 1.001;
 
-/// Upper bound of the error of a surface point, and of a texture coordinate computed from it, in
-/// rounding errors of the largest number in the computation.
+/// Upper bound of the error of a surface point, and of a texture coordinate computed from it. The
+/// unit is the rounding error of the largest number in the computation.
 const POINT_ROUNDINGS: f64 = 16.0;
 
 /// Largest angle between the normal of a surface and the gradient of a texture coordinate at which
-/// the coordinate counts as constant along the surface, in rounding errors of 1.
+/// the coordinate counts as constant along the surface. The unit is the machine epsilon.
 const ANGLE_ROUNDINGS: f64 = 64.0;
 
 /// Placement of a texture on one part of an object, compiled for the kernels.

@@ -92,7 +92,7 @@ impl<L: SimdFloat> Interface<L> {
     }
 
     /// Returns the factors of reflected and transmitted radiance. `outer` has the lanes of rays
-    /// from outside of a solid, `thin` the lanes of thin panes, which do not refract.
+    /// from outside a solid, `thin` the lanes of thin panes, which do not refract.
     ///
     /// Without Fresnel's equations, a solid reflects only on its outer side and in total internal
     /// reflection. This prevents endless reflections between its inner walls.

@@ -21,7 +21,7 @@ pub struct InterfaceMedia<L: SimdFloat> {
     pub n_i: L,
     /// Index of refraction behind the interface; at a thin surface, the index of its material.
     pub n_t: L,
-    /// Lanes whose rays arrive from outside of the solid.
+    /// Lanes whose rays arrive from outside the solid.
     pub outer: L::Mask,
     /// Lanes of thin surfaces, which bound no solid and do not refract.
     pub thin: L::Mask,
@@ -34,7 +34,7 @@ pub struct InterfaceQuery<L: SimdFloat> {
     pub rays: BsdfQuery<L>,
     /// Media of the interface.
     pub media: InterfaceMedia<L>,
-    /// Lanes in which the reflection lobe of the BSDF counts; total internal reflection counts in
+    /// Lanes in which the reflection lobe of the BSDF reflects; total internal reflection occurs in
     /// all lanes.
     pub reflecting: L::Mask,
 }
@@ -296,10 +296,10 @@ struct Facet<L> {
 /// lanes of `behind`, by reflection elsewhere. The density is 0 for directions on the wrong side of
 /// the surface.
 ///
-/// The half vector of refraction is n_i V + n_t L, with V the direction to the viewer and L =
-/// `direction`. Its solid angle per solid angle of L is n_t^2 L.h / |n_i V + n_t L|^2 (Walter et
-/// al. 2007, eq. 16 and 17). At thin surfaces the transmitted ray is the reflected ray, mirrored to
-/// the other side.
+/// In refraction, the microfacet normal h has the direction n_i V + n_t L, with V the direction to
+/// the viewer and L = `direction`. The solid angle of h per solid angle of L is n_t^2 L.h / |n_i V
+/// + n_t L|^2 (Walter et al. 2007, eq. 16 and 17). At thin surfaces the transmitted ray is the
+/// reflected ray, mirrored to the other side.
 #[inline(always)]
 fn facet<L: SimdFloat>(
     facets: &MicrofacetDistribution<L::Scalar>,

@@ -150,7 +150,7 @@ impl Texture {
         }
     }
 
-    /// Returns [`Texture::placement`] as a mutable reference.
+    /// Returns the placement of the texture on shapes, for changes.
     pub fn placement_mut(&mut self) -> &mut Placement {
         match self {
             Self::Image(image) => &mut image.placement,
@@ -158,7 +158,7 @@ impl Texture {
         }
     }
 
-    /// Returns `true` if the texture changes colours.
+    /// Returns `false` for an image that is not loaded, otherwise `true`.
     pub fn has_effect(&self) -> bool {
         match self {
             Self::Image(image) => image.content.content().is_some(),
@@ -203,7 +203,7 @@ impl crate::material::Material {
         self.loads().filter_map(|(_, content)| content.content())
     }
 
-    /// Reads the files of the texture and of the bump map by `load`, unless they are loaded already.
+    /// Reads the files of texture and bump map with `load`, unless they are loaded already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Image>, AssetError>) {
         if let Some(Texture::Image(image)) = &mut self.texture {
             image.content.resolve(&image.file, &load);

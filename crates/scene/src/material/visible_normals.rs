@@ -17,15 +17,14 @@ fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
 }
 
 /// Samples a microfacet normal h of the Beckmann distribution that is visible from `view` (unit
-/// vector with a positive z). The density is D_v(h) = G_1(view, h) D(h) view.h / view.z. G_1 is that of
-/// the model `masking`.
+/// vector with a positive z). The density is G_1(view, h) D(h) view.h / view.z, with the G_1 of the
+/// model `masking`.
 ///
 /// First, the slopes of a microfacet along x and y are sampled, in units of `alpha`, whether the
 /// microfacet is visible or not: independent normal deviates with the variance 1/2, from `u` and
 /// `v`. Then the component of the slope along the azimuth of the view is replaced by the slope that
 /// has the same quantile among the visible microfacets. For views near the normal this changes the
-/// slope little, and samples across the reflection of an edge along x or y are as even as `u` or
-/// `v`.
+/// slope little, so that slopes along x and y stay as evenly distributed as `u` and `v`.
 #[inline(always)]
 pub fn beckmann_visible<L: SimdFloat>(
     u: L,
@@ -240,13 +239,13 @@ pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L>
 ///
 /// A point (s, s') of the unit disk stands for the microfacet with the slopes (s, s') / sqrt(1 -
 /// s^2 - s'^2), in units of alpha. The points of all microfacets, visible or not, are uniform in
-/// the disk. Coordinate s points away from the view, along the azimuth of the view. In the rest of
-/// this comment, the unit of s is half the chord of the disk at s'. The coordinate is thus uniform
-/// in \[-1, 1\] over all microfacets. Where both sides of the groove are visible, the visible
+/// the disk. The axis of s points away from the view, along the azimuth of the view; only s is
+/// replaced. From here on, s is divided by half the chord of the disk at s', and is thus uniform in
+/// \[-1, 1\] over all microfacets. Where both sides of the groove are visible, the visible
 /// microfacets have the distribution function s + sqrt(1 - s^2) tan(theta), up to a constant; theta
 /// is the angle between the stretched view and z. Where one side is visible, their distribution
-/// function is twice the function of all microfacets. Both functions have inverses in closed form:
-/// with s = sin(a), the first is sin(a + theta) / cos(theta).
+/// function is twice that of all microfacets. Both functions have inverses in closed form: with s =
+/// sin(a), the first is sin(a + theta) / cos(theta).
 #[inline(always)]
 pub fn ggx_visible_v_cavity<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();
