@@ -63,8 +63,8 @@ impl<S: Float> DeltaLight<S> {
         LightSample { wi, distance, irradiance, density: L::from_f64(L::MAX) }
     }
 
-    /// Returns the irradiance at normal incidence at the scene's centre. A light with falloff that
-    /// is nearer than `radius` counts as if it were at this distance.
+    /// Returns the irradiance at normal incidence at the scene's centre. If the irradiance is in
+    /// inverse proportion to the squared distance, this distance counts as at least `radius`.
     pub fn typical_irradiance(&self, radius: f64) -> f64 {
         match self.position().filter(|_| self.is_inverse_square()) {
             Some(position) => {

@@ -1,9 +1,9 @@
 //! Emitters: surfaces that emit light, compiled for the kernels. A light with a size is an emissive
 //! surface without a body; an emissive object is one with a body.
 //!
-//! A point that is sampled on an object is lifted off its surface to the side of the receiver, so
-//! that the object does not occlude its own points. The lift is along the normal and larger than
-//! the rounding errors of the surface. It therefore suffices for rays at any angle.
+//! A point that is sampled on an object is lifted off its surface, to the side of the receiver (the
+//! point that it lights), so that the object does not occlude it. The lift is along the normal and
+//! larger than the rounding errors of the surface. It therefore suffices for rays at any angle.
 
 use crate::light::solid_angle::{Cone, SphericalRectangle, density_of_area};
 use crate::light::triangles::{FacesSeen, MAX_FACES, Triangle};
@@ -16,8 +16,8 @@ use zerkalo_kernel::sampling::warp;
 /// Radius of a sphere around all points of every scene.
 const EVERYWHERE: f64 = 1e30;
 
-/// Distance of a distant disk, as a fraction of the largest finite number, which is the distance of
-/// rays that hit nothing.
+/// Distance that is reported for a distant disk, as a fraction of the largest finite number, which
+/// is the distance of rays that hit nothing.
 const DISTANT: f64 = 0.5;
 
 /// Surface that emits light of intensity 1, white and the same at every point and in every
@@ -29,7 +29,7 @@ pub struct Emitter<S> {
     pub radiance: S,
     /// Centre of a bounding sphere of all sampled points, relative to the scene's centre.
     pub center: DVec3,
-    /// Radius of that bounding sphere.
+    /// Radius of the bounding sphere around `center`.
     pub radius: f64,
     pub area: f64,
 }
@@ -77,9 +77,9 @@ pub(super) struct Sides<S> {
 
 impl<S: Float> Sides<S> {
     /// Lifts a point of a flat surface to the side of the receiver. [x, y, height] are the point's
-    /// coordinates across, up and along the normal, relative to the receiver. The result has two
-    /// parts: the coordinates of the lifted point, and the lanes of `backs` whose receiver is behind
-    /// the surface. In these lanes the sign of the height is reversed, so that it is negative in all
+    /// coordinates across, up and along the normal, relative to the receiver. Returns the
+    /// coordinates of the lifted point, and the lanes of `backs` whose receiver is behind the
+    /// surface. In these lanes the sign of the height is reversed, so that it is negative in all
     /// lanes whose receiver gets light.
     #[inline(always)]
     pub fn lifted<L: SimdFloat<Scalar = S>>(
@@ -158,9 +158,9 @@ impl<S: Float> Emitter<S> {
     }
 
     /// Compiles the surface of an emissive object of radiance 1, in coordinates relative to the
-    /// scene's centre. Its back emits light, too, if `both_sides` is `true`. `lift` is the height of
-    /// sampled points above the surface, at most 1e-4 of the surface's thickness. Returns `None` if
-    /// the surface has no area.
+    /// scene's centre. Its back emits light, too, if `both_sides` is `true`. `lift` is the height
+    /// of sampled points above the surface; it is limited to 1e-4 of the surface's thickness.
+    /// Returns `None` if the surface has no area.
     pub fn of_object(surface: &EmissiveSurface, both_sides: bool, lift: f64) -> Option<Self> {
         let (area, radius) = (surface.area(), surface.radius());
         if !(area > 0.0 && area.is_finite() && radius.is_finite()) {
@@ -197,8 +197,8 @@ impl<S: Float> Emitter<S> {
     }
 
     /// Returns the distance at which each ray hits the front of a surface without a body; the
-    /// largest finite number for rays that miss it. `direction` must be of unit length. Triangles
-    /// have bodies, which are parts of the geometry: rays miss them here.
+    /// largest finite number for a miss. `direction` must be of unit length. Rays miss triangles
+    /// here, because these are part of the geometry.
     #[inline(always)]
     pub fn hit<L: SimdFloat<Scalar = S>>(&self, origin: Vec3<L>, direction: Vec3<L>) -> L {
         let missed = L::from_f64(L::MAX);
@@ -434,8 +434,8 @@ mod tests {
 
     const LIFT: f64 = 1e-10;
 
-    /// Returns spheres, rectangles and triangles that emit light. The points of [`points`] are in front of,
-    /// behind, beside and inside of these surfaces.
+    /// Returns spheres, rectangles and triangles that emit light. The points of [`points`] are in
+    /// front of, behind, beside and inside these surfaces.
     fn surfaces() -> Vec<EmissiveSurface> {
         let tetrahedron = [
             DVec3::new(0.0, 0.0, 0.0),

@@ -46,7 +46,7 @@ impl Environment {
         self.map.content()
     }
 
-    /// Reads the image by `load`, unless it is loaded already.
+    /// Reads the image with `load`, unless it is loaded already.
     pub fn resolve(&mut self, load: impl FnOnce(&str) -> Result<Arc<RadianceMap>, AssetError>) {
         self.map.resolve(&self.file, load);
     }

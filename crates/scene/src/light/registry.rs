@@ -16,7 +16,7 @@ pub trait LightDesc: KeyNode {
         self.validator().errors()
     }
 
-    /// Returns the values that edits of position and direction change.
+    /// Returns the position and the directions of the light, for edits.
     fn handles(&mut self) -> Handles<'_> {
         Handles::default()
     }
@@ -30,7 +30,7 @@ pub trait LightDesc: KeyNode {
     fn place(&mut self, _: &Placement) {}
 }
 
-/// Values that determine position and direction of a light; `None` where its kind has no such key.
+/// References to the position and the directions of a light; `None` where its kind has no such key.
 #[derive(Debug, Default)]
 pub struct Handles<'a> {
     /// Position of the light, or centre of its surface.

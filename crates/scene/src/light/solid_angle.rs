@@ -4,9 +4,9 @@
 use std::f64::consts::TAU;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 
-/// Smallest solid angle \[sr\] at which a rectangle or triangle is sampled by solid angle, not by
-/// area, in rounding errors of the number type. At this solid angle, rounding moves sampled points
-/// by 1e-5 of the surface's size.
+/// Smallest solid angle at which a rectangle or triangle is sampled by solid angle, not by area.
+/// The unit is the machine epsilon of the number type \[sr\]. At this solid angle, rounding moves
+/// sampled points by 1e-5 of the surface's size.
 const MIN_SOLID_ANGLE: f64 = 2e5;
 
 /// Returns the density [1/sr] of the directions to a flat surface on which points are sampled
@@ -58,7 +58,7 @@ impl<L: SimdFloat> Cone<L> {
 ///
 /// Ureña, Fajardo, King 2013, *An Area-Preserving Parametrization for Spherical Rectangles*.
 pub(super) struct SphericalRectangle<L: SimdFloat> {
-    /// Intervals of the coordinates across (`x`) and up (`y`), relative to the receiver.
+    /// Interval of the coordinate across (`x`) and of the one up (`y`), relative to the receiver.
     x: [L; 2],
     y: [L; 2],
     /// Coordinate of the plane along the normal, relative to the receiver; negative if the receiver

@@ -1,4 +1,4 @@
-//! Light from a sphere. Points inside of it are lit from all sides.
+//! Light from a sphere. Points inside it are lit from all sides.
 
 use crate::light::{EmissiveSurface, Handles, LightDesc, LightForm, Placement, registry};
 use crate::value::description;

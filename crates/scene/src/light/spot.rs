@@ -82,8 +82,8 @@ pub struct SpotCone<S> {
     pub scale: S,
 }
 
-/// Value of [`SpotCone::outer`] for all directions: above 2, the largest value of s, because of
-/// rounding.
+/// Value of [`SpotCone::outer`] that includes all directions. It exceeds 2, the largest value of s,
+/// to allow for rounding.
 const ALL_DIRECTIONS: f64 = 3.0;
 
 impl<S: Float> SpotCone<S> {

@@ -24,7 +24,7 @@ pub(super) struct Triangle<S> {
 }
 
 impl<S: Float> Triangle<S> {
-    /// Compiles triangles with the given corners. In this order, their ranges follow one another.
+    /// Compiles triangles with the given corners. Their ranges follow one another in this order.
     pub fn list(all: &[[DVec3; 3]]) -> Vec<Self> {
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
         let area_of = |corners: &[DVec3; 3]| 0.5 * doubled_normal(corners).length();
