@@ -1,7 +1,7 @@
 //! Interactive camera movements.
 //!
 //! Each movement returns a new camera, or the old one if the new one would be invalid. The pivot is
-//! the target; a camera without a target has its pivot `distance` ahead. Coordinates are rounded to
+//! the target, or a point `distance` ahead if the camera has no target. Coordinates are rounded to
 //! about a millionth of the distance between eye and pivot. Rotations are relative to `up`; the
 //! view direction stays at least 0.1 degrees away from it.
 
@@ -109,8 +109,8 @@ impl Camera {
             let half = (0.5 * degrees).to_radians().tan() * factor;
             let [narrow, wide] = ZOOM_ANGLES;
             let new = round_significant(2.0 * half.atan().to_degrees(), 4).clamp(narrow, wide);
-            // Clamping an angle outside of the limits would change it in the direction opposite to
-            // the zoom.
+            // Clamping an angle outside the limits would change it in the direction opposite to the
+            // zoom.
             if (new < degrees) == (factor < 1.0) { new } else { degrees }
         };
         let view_angle = match self.view_angle {
@@ -137,7 +137,7 @@ impl Camera {
         self.valid_or_self(aimed.placed(center - forward * distance, forward, distance))
     }
 
-    /// Returns the distance from the eye to the pivot; 1 if it is not positive and finite.
+    /// Returns the distance to the target, or `distance` without a target; 1 if it is invalid.
     fn pivot_distance(&self, distance: f64) -> f64 {
         let to_target = self.target.map(|t| DVec3::from_array(t) - DVec3::from_array(self.eye));
         let distance = to_target.map_or(distance, DVec3::length);

@@ -5,15 +5,15 @@ use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 
-/// Perspective camera compiled for a film size. The direction to the corner of a pixel is computed
-/// in double precision, offsets inside the pixel in the precision of the rays.
+/// Perspective camera compiled for a film size. Directions to corners of pixels are computed in
+/// double precision, offsets inside a pixel in the precision of the rays.
 #[derive(Clone, Copy, Debug)]
 pub struct PerspectiveCamera {
     /// Position of the eye relative to the `origin` of [`PerspectiveCamera::new`].
     pub eye: DVec3,
     /// Unit vectors to the right, up in the picture, and forward.
     pub frame: [DVec3; 3],
-    /// Vectors to the next pixel to the right and below, on the picture plane at unit distance.
+    /// Vector to the next pixel to the right, on the picture plane at unit distance.
     dx_axis: DVec3,
     dy_axis: DVec3,
     /// Vector from the eye to the picture's upper left corner, on the picture plane.
@@ -63,11 +63,11 @@ impl PerspectiveCamera {
         self.lens.map_or(0.0, |lens| lens.radius)
     }
 
-    /// Returns about the smallest angle \[radians\] between rays of neighbouring pixels, which
-    /// occurs at the picture's corners.
+    /// Returns approximately the smallest angle \[radians\] between rays of neighbouring pixels,
+    /// which is found at the picture's corners.
     pub fn pixel_angle(&self) -> f64 {
-        // Let a pixel of size p be at the distance d. A step of p perpendicular to the ray rotates
-        // it by about p / d; a step on the oblique plane rotates it by at least p / d^2.
+        // A step of the pixel size p perpendicular to a ray, at the distance d, rotates the ray by
+        // about p / d. A step on the oblique picture plane rotates it by at least p / d^2.
         self.pixel() / self.raster_corner.length_squared()
     }
 
