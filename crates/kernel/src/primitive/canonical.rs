@@ -138,9 +138,8 @@ pub trait CanonicalShape {
     /// box, the distance to the box may be the bound.
     fn clearance(&self, point: DVec3) -> Option<f64>;
 
-    /// Returns the unit normals of the surfaces whose distance from `point` is at most `slack`: one
-    /// list for each solid of a compound that has such a surface, and at most one list for other
-    /// geometry.
+    /// Returns the unit normals of the surfaces whose distance from `point` is at most `slack`. A
+    /// compound has one list for each solid with such a surface, other geometry at most one list.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
     /// Returns the projection for materials that choose none: `Box`, unless the form overrides it.

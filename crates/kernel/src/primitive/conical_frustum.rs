@@ -113,8 +113,8 @@ impl CanonicalShape for ConicalFrustumForm {
 }
 
 /// Returns the distance between `point` and the surface of a conical frustum. `top` is the radius
-/// of the cap. In each half-plane through the axis, the surface has an outline of three segments:
-/// from the middle of the base to its rim, to the rim of the cap, and on to the middle of the cap.
+/// of the cap. In each half-plane through the axis, the outline of the surface has three segments:
+/// from the middle of the base to its rim, on to the rim of the cap, and to the middle of the cap.
 fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
     const ANGLES: usize = 64;
     let place = |x, y, z| scene_from_unit.transform_point3(DVec3::new(x, y, z));

@@ -69,9 +69,9 @@ impl CanonicalShape for EllipsoidForm {
 /// Returns the distance between `point` and the surface of an ellipsoid.
 ///
 /// M is the linear part of the map, Q is (M M^T)^-1, and p is the point relative to the centre. The
-/// surface is q^T Q q = 1. Its closest point to p is q = (I + l Q)^-1 p for the only number l for
-/// which q is on the surface and `I + l Q` is positive definite. q^T Q q decreases with l. (Eberly
-/// 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid*.)
+/// surface is q^T Q q = 1. Its point closest to p is q = (I + l Q)^-1 p, where I + l Q is positive
+/// definite. Only one such l puts q on the surface. Bisection finds it, because q^T Q q decreases
+/// with l (Eberly 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid*).
 fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_unit.matrix3.inverse();
     let q = inverse.transpose() * inverse;

@@ -1,5 +1,5 @@
-//! Tori. Rays are transformed into the space of a torus about the y axis, with a ring (the circle
-//! in the middle of the tube) of radius 1 and a tube of radius r: (rho - 1)^2 + y^2 <= r^2, with
+//! Tori. Rays are transformed into the space of a torus about the y axis. Its ring, the circle in
+//! the middle of the tube, has radius 1, and its tube has radius r: (rho - 1)^2 + y^2 <= r^2, with
 //! rho^2 = x^2 + z^2.
 //!
 //! A line meets the torus where the height h = (rho - 1)^2 + y^2 - r^2 is 0, at most four times.

@@ -335,8 +335,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns the lanes of `wanted` whose ray hits a primitive of the BVH at a distance between 0
-    /// and `limit`. `number` is the index of the primitive in [`Aggregate::in_tree`].
+    /// Returns the lanes of `wanted` whose ray hits one given primitive of the BVH at a distance
+    /// between 0 and `limit`. `number` is the index of this primitive in [`Aggregate::in_tree`].
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (index, i) = self.in_bvh[number as usize];
