@@ -87,9 +87,9 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Returns the reflectance of a colour channel at the cosine `c` by Cook and Torrance's form of
-    /// Fresnel's equations: 1/2 A^2 (1 + B^2), with A = (g - c) / (g + c), B = (c (g + c) - 1) / (c
-    /// (g - c) + 1) and g^2 = n^2 + c^2 - 1. n is the index of refraction.
+    /// Returns the reflectance of a colour channel with the index n at the cosine `c`: 1/2 A^2 (1 +
+    /// B^2), where g^2 = n^2 + c^2 - 1, A = (g - c) / (g + c), B = (c (g + c) - 1) / (c (g - c) +
+    /// 1). This is Cook and Torrance's form of Fresnel's equations.
     #[inline(always)]
     fn exact<L: SimdFloat<Scalar = S>>(&self, c: L, channel: usize) -> L {
         if self.total[channel] {
