@@ -42,18 +42,18 @@ enum SurfaceKind {
     Transparent(u32),
     /// Boundary of an opaque solid, which no ray enters.
     Opaque,
-    /// Flat transparent primitive without inside, such as a window pane.
+    /// Flat transparent primitive, which has no inside, such as a window pane.
     Pane,
-    /// Flat opaque primitive without inside, such as a sheet of paper.
+    /// Flat opaque primitive, which has no inside, such as a sheet of paper.
     Sheet,
 }
 
-/// Another primitive that may touch a primitive.
+/// Primitive that may touch a given primitive.
 #[derive(Clone, Copy, Debug)]
 struct Contact<S> {
     /// Id of the touching primitive; for a compound, the id of its first part.
     primitive: u32,
-    /// Smallest tie distance \[scene units\].
+    /// Lower bound of the tie distance \[scene units\].
     tie: S,
     /// Corners of the touching primitive's bounding box, infinite where it is unbounded.
     low: [S; 3],
@@ -206,7 +206,7 @@ impl<S: Float> Contacts<S> {
     }
 
     /// Returns the lanes whose `point`, on `primitives`, may be on a second primitive as
-    /// well. Points outside of the bounding boxes of all other primitives are excluded, because
+    /// well. Points outside the bounding boxes of all other primitives are excluded, because
     /// most primitives touch others only in small regions.
     #[inline(always)]
     pub fn near<L: SimdFloat<Scalar = S>>(
@@ -226,7 +226,7 @@ impl<S: Float> Contacts<S> {
     }
 
     /// Returns the layer of `primitive` for rays that come from a surface with the layer `before`.
-    /// `leaves` selects rays that run along the outward normal.
+    /// `leaves` are the lanes whose rays run along the outward normal.
     fn layer<L: SimdFloat<Scalar = S>>(&self, primitive: u32, leaves: L::Mask, before: L) -> L {
         let (kind, layer) = &self.kinds[primitive as usize];
         let layer = L::splat(*layer);
@@ -248,9 +248,9 @@ impl<S: Float> Contacts<S> {
         self.search(geometry, coincident, media, L::from_f64(L::MAX))
     }
 
-    /// Finds the surface that the rays cross first: the start surface in `coincident`, whose layer
-    /// is ignored, or one that coincides with it. `leaves` selects rays that run along the outward
-    /// normal of the start surface.
+    /// Finds the surface that the rays cross first: the start surface or one that coincides with
+    /// it. The layer in `coincident` is ignored. `leaves` are the lanes whose rays run along the
+    /// outward normal of the start surface.
     pub fn first<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,

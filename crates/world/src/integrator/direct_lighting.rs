@@ -44,8 +44,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         self.out.groups[group] += radiance;
     }
 
-    /// Returns the radiance at the eye of light of unit emission, where `value` is the BSDF
-    /// [1/sr] times the cosine of the angle of incidence.
+    /// Returns the radiance that `light`, of unit emission, adds to the samples if nothing occludes
+    /// it. `value` is the BSDF [1/sr] times the cosine of the angle of incidence.
     #[inline(always)]
     pub fn unoccluded(&self, value: Vec3<L>, light: &LightSample<L>) -> Vec3<L> {
         let radiance = self.path.throughput.component_mul(value).component_mul(light.irradiance);

@@ -64,7 +64,7 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     }
 }
 
-/// Reflected rays of a packet, which find emitters by the second strategy.
+/// Reflected rays of a packet, which may hit emitters (the second strategy).
 pub(crate) struct ReflectedRays<L: SimdFloat> {
     /// Lanes whose reflected rays the integrator follows.
     pub lanes: L::Mask,
@@ -117,7 +117,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
     }
 
     /// Adds the light of all emitters and environments that the surfaces reflect. `rays` are the
-    /// reflected rays that find this light, too.
+    /// reflected rays, which may hit emitters.
     #[inline(never)]
     pub fn emitter_lighting(&mut self, rays: &ReflectedRays<L>) {
         let (world, interaction) = (self.world, self.interaction);
@@ -150,7 +150,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         }
     }
 
-    /// Returns the lanes of `lanes` whose BSDF scatters light in more than single directions.
+    /// Returns the lanes of `lanes` whose BSDF scatters light: no mirrors and no smooth glass.
     #[inline(always)]
     pub fn not_delta(&self, lanes: L::Mask) -> L::Mask {
         let bsdfs = self.interaction.bsdfs(lanes);
@@ -161,8 +161,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
 
     /// Returns the BSDF [1/sr] times the cosine of the angle of incidence, weighted for multiple
     /// importance sampling, in the lanes in which `light` `arrives` at the surface. `rays` are the
-    /// reflected rays that find this light, too. `diffuse` gets the density of cosine-weighted
-    /// directions and returns it times its weight.
+    /// reflected rays that may hit the light; `None` if it is invisible to them. `diffuse` gets the
+    /// density [1/sr] of cosine-weighted directions and returns it times its weight.
     #[inline(always)]
     pub fn reflected(
         &self,

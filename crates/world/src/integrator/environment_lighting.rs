@@ -49,7 +49,7 @@ pub(crate) fn visible_environments<L: SimdFloat>(
 
 impl<L: SimdFloat> Vertex<'_, L> {
     /// Adds the light of all environments that the surfaces reflect. `glossy` are the reflected
-    /// rays with a finite density, which find this light, too.
+    /// rays of glossy lobes, the second strategy.
     #[inline(never)]
     pub fn environment_lighting(&mut self, glossy: &ReflectedRays<L>) {
         let interaction = self.interaction;
@@ -81,7 +81,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         source.with_light(source.light.sample(numbers, lanes))
     }
 
-    /// Adds light of an environment from a cosine-weighted direction, in `lanes`.
+    /// Adds the light of an environment from a cosine-weighted direction (third strategy), in
+    /// `lanes`.
     #[inline(always)]
     fn add_cosine_sample(
         &mut self,
@@ -103,7 +104,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
     }
 
     /// Adds reflected light of an environment. `wi` are the directions from which it arrives, and
-    /// `value` is the reflected radiance if nothing occludes them.
+    /// `value` is the reflected radiance if nothing occludes it.
     #[inline(always)]
     fn add_environment(
         &mut self,

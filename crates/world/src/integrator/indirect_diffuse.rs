@@ -5,7 +5,7 @@
 //! chosen for the diffuse bounce, with a probability in proportion to the light that it can pass on
 //! (weighted reservoir sampling, Chao 1982, *A General Purpose Unequal Probability Sampling Plan*).
 //! The next generation starts at the chosen hit, in a direction whose density is the cosine to the
-//! normal, divided by pi. Mirrors thereby have no more noise than without diffuse bounces, and a
+//! normal, divided by pi. Mirrors therefore have no more noise than without diffuse bounces, and a
 //! path bounces at most once per generation.
 //!
 //! Emitters and environments are sampled at every hit. A ray that starts at a diffuse bounce
@@ -39,7 +39,6 @@ pub(crate) struct DiffuseLimits {
 /// Reservoir of weighted reservoir sampling. It keeps one hit per lane, chosen from all hits of a
 /// generation, at which the next diffuse bounce starts.
 pub(crate) struct DiffuseReservoir<L: SimdFloat> {
-    /// Number of offers so far.
     offers: u32,
     /// Lanes whose reservoir holds a hit.
     lanes: L::Mask,
@@ -70,10 +69,10 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         }
     }
 
-    /// Offers the hits of `vertex` to the reservoir. A diffuse bounce would start with `media` and
-    /// `coincident`, on the side from which the path arrived. Returns the lanes whose surface
-    /// reflects diffusely: they get no ambient light, because the diffuse bounce computes their
-    /// indirect light.
+    /// Offers the hits of `vertex` to the reservoir. `media` and `coincident` are the state in
+    /// which a diffuse bounce would start, on the side from which the path arrived. Returns the
+    /// lanes whose surface reflects diffusely: they get no ambient light, because the diffuse
+    /// bounce computes their indirect light.
     #[inline(never)]
     pub fn offer(
         &mut self,
@@ -84,8 +83,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         let interaction = vertex.interaction;
         let throughput = vertex.path.throughput.component_mul(interaction.diffuse);
         let weight = throughput.max_element();
-        // Lights do not illuminate a surface behind a coincident surface, but it has a diffuse
-        // bounce like other surfaces.
+        // A surface behind a coincident surface gets no light from lights, but has a diffuse bounce
+        // like other surfaces.
         let lanes = interaction.has_bsdf & weight.gt(L::zero());
         if lanes.none() {
             return lanes;

@@ -19,7 +19,7 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub front: L::Mask,
     /// Ids of the primitives that are hit.
     pub primitive: L,
-    /// Index of each BSDF, stored as an id (see [`SimdFloat::from_id`]).
+    /// Index of the BSDF in each lane, stored as an id (see [`SimdFloat::from_id`]).
     bsdf: L,
     /// Factor of the albedo from textures and vertex colours.
     pub albedo_factor: Vec3<L>,
@@ -33,7 +33,7 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub highlight_mask: L::Mask,
     /// Lanes whose BSDF has a reflection lobe.
     pub reflecting: L::Mask,
-    /// Lanes that get no light from lights, because a coincident surface is in front of them.
+    /// Lanes whose surface no light reaches, because a coincident surface is in front of it.
     pub covered: L::Mask,
 }
 

@@ -37,7 +37,7 @@ pub(crate) struct Integrator<'a, L: SimdFloat> {
 }
 
 impl<L: SimdFloat> World<L> {
-    /// Traces one packet of paths from the camera, and overwrites `path`. Lanes outside of `active`
+    /// Traces one packet of paths from the camera, and overwrites `path`. Lanes outside `active`
     /// stay black. `candidates` are the primitives that the camera rays and the shadow rays from
     /// their hit points are tested against; `None` means all primitives.
     #[inline(always)]

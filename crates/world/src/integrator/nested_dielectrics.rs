@@ -2,9 +2,9 @@
 //! Traced Images*).
 //!
 //! Transparent solids may overlap. The solid that comes last in the scene file has the highest
-//! priority: it fills the common space, and rays pass the boundaries of the other solids there. A
+//! priority: it fills the common space, in which rays ignore the boundaries of the other solids. A
 //! bubble therefore comes after the glass ball that contains it. Water may overlap the wall of a
-//! glass that comes after the water. Outside of all solids the index of refraction is 1.
+//! glass that comes after the water. Outside all solids the index of refraction is 1.
 
 use crate::compile::RecenteredGeometry;
 use crate::integrator::coincident_surfaces::Contacts;
@@ -15,7 +15,7 @@ use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, distinc
 use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId, box_distance};
 use zerkalo_scene::material::{Bsdf, InterfaceMedia, InterfaceQuery, Transmission};
 
-/// Largest number of solids that a medium stack holds. If a ray is inside of more solids, the stack
+/// Largest number of solids that a medium stack holds. If a ray is inside more solids, the stack
 /// has those listed last in the scene file.
 const MAX_NESTING: usize = 4;
 
@@ -27,7 +27,7 @@ pub(crate) struct MediumStack<L> {
 }
 
 impl<L: SimdFloat> MediumStack<L> {
-    /// Returns the stack of rays outside of all solids.
+    /// Returns the stack of rays outside all solids.
     #[inline(always)]
     pub fn vacuum() -> Self {
         Self { priorities: [L::zero(); MAX_NESTING] }
@@ -39,7 +39,7 @@ impl<L: SimdFloat> MediumStack<L> {
         self.priorities[0]
     }
 
-    /// Returns the lanes whose ray is inside of the solid with `priority`.
+    /// Returns the lanes whose ray is inside the solid with `priority`.
     pub fn contains(&self, priority: L) -> L::Mask {
         self.priorities.iter().fold(L::mask(false), |found, entry| found | equal(*entry, priority))
     }
@@ -101,7 +101,7 @@ pub(crate) struct Media<'a, L: SimdFloat> {
     pub stack: &'a MediumStack<L>,
 }
 
-/// Returns `true` if the bounding box of an object overlaps the sphere `ball` or is infinite.
+/// Returns `true` if the bounding box of `form` overlaps the sphere `ball` or is infinite.
 pub(crate) fn may_reach(ball: &BoundingSphere, form: &Form) -> bool {
     let reaches = |bounds| box_distance(bounds, ball.center) <= ball.radius;
     form.bounds().is_none_or(reaches)
@@ -117,7 +117,7 @@ pub(crate) struct NestedDielectrics<L: SimdFloat> {
     absorption: Option<Vec<[L::Scalar; 3]>>,
     /// Priorities and boundaries of the solids that may contain the origins of camera rays.
     around_eye: Vec<(u32, Aggregate<L>)>,
-    /// `None` if no transmissive primitive may touch another one.
+    /// Primitives that may touch a transmissive primitive; `None` if there are none.
     pub contacts: Option<Contacts<L::Scalar>>,
 }
 
@@ -125,7 +125,7 @@ pub(crate) struct NestedDielectrics<L: SimdFloat> {
 pub(crate) struct InterfaceHit<L: SimdFloat> {
     /// Lanes whose ray hits a transmissive surface.
     pub lanes: L::Mask,
-    /// Lanes whose ray hits a boundary inside of a solid with a higher priority. The ray passes it
+    /// Lanes whose ray hits a boundary inside a solid with a higher priority. The ray passes it
     /// unchanged.
     pub suppressed: L::Mask,
     pub media: InterfaceMedia<L>,
@@ -267,7 +267,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
 }
 
 /// Returns the part of `radiance` that is left after `distance` [scene units] in `media`, by Beer's
-/// law; all if there are none. `distance` may be the largest finite number.
+/// law; all of it without media. `distance` may be the largest finite number.
 #[inline(always)]
 pub(crate) fn attenuated<L: SimdFloat>(
     media: Option<Media<'_, L>>,

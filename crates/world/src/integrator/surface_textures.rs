@@ -35,7 +35,7 @@ pub(crate) struct ShadingPoints<L: SimdFloat> {
     pub lanes: L::Mask,
 }
 
-/// Returns the projection that `mapping` selects for a shape.
+/// Returns the projection that `mapping` selects for a shape with the texture space `space`.
 fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
     match mapping {
         Mapping::Auto => space.default_mapping,

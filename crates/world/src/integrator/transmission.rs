@@ -309,8 +309,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     }
 }
 
-/// Returns the reflected rays that find emitters, too, and the reflected share of the light. Rough
-/// interfaces are excluded; see [`RoughInterface`].
+/// Returns the reflected rays that may hit emitters, and the reflected share of the light. Rough
+/// interfaces are excluded, because [`Vertex::interface_lighting`] computes their light.
 fn reflected_rays<L: SimdFloat>(
     vertex: &Vertex<'_, L>,
     hit: Option<&InterfaceHit<L>>,
@@ -385,7 +385,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
     }
 
     /// Samples the directions of `lanes`, whose surfaces have BSDF number `index`: they are opaque,
-    /// or transmit without roughness. `numbers` is the argument of [`Vertex::lobe_numbers`].
+    /// or transmit without roughness. `numbers`: see [`Vertex::lobe_numbers`].
     fn sample_smooth(
         &mut self,
         vertex: &mut Vertex<'_, L>,
@@ -430,7 +430,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
     }
 
     /// Samples the directions of `lanes`, whose surfaces have BSDF number `index` and transmit with
-    /// roughness. `numbers` is the argument of [`Vertex::lobe_numbers`].
+    /// roughness. `numbers`: see [`Vertex::lobe_numbers`].
     #[inline(never)]
     fn sample_rough(
         &mut self,
@@ -443,7 +443,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
         let uv = vertex.lobe_numbers(false, numbers);
         let throughput = vertex.path.throughput;
         let sample = vertex.world.bsdfs[index].sample_interface(query, uv);
-        // Rays pass a suppressed boundary (inside of a solid with a higher priority) unchanged.
+        // Rays pass a suppressed boundary (inside a solid with a higher priority) unchanged.
         let rough = lanes.and_not(hit.suppressed);
         let weight = throughput.component_mul(sample.reflected_weight);
         let reflected = &mut self.reflected;

@@ -1,4 +1,4 @@
-//! Vertices of a packet of paths: what both integrators do where their rays hit surfaces.
+//! Vertices of a packet of paths: shading and reflection at the hit points of its rays.
 
 use crate::culling::tile::TileCandidates;
 use crate::integrator::emitter_lighting::{ReflectedRays, eval_lobe};
@@ -49,8 +49,9 @@ pub(crate) fn add_background<L: SimdFloat>(
 
 impl<L: SimdFloat> Vertex<'_, L> {
     /// Adds the light that the surfaces emit and reflect. `emitters` is `true` if the world may
-    /// have emitters. `bouncing` are the lanes whose diffuse bounces compute their indirect light;
-    /// `None` if there are no bounces. `rays` returns the reflected rays that find emitters, too.
+    /// have emitters. `bouncing` are the lanes whose indirect light a diffuse bounce computes;
+    /// `None` if there are no bounces. `rays` returns the reflected rays that the integrator
+    /// follows.
     #[inline(always)]
     pub fn shade<const SIMPLE: bool>(
         &mut self,
