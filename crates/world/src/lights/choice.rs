@@ -31,7 +31,7 @@ pub(crate) const MIN_LIGHTS: usize = 16;
 const MIN_SET: usize = 4;
 
 /// Weight of the part of the variance that all lights have in common, relative to the other parts;
-/// see [`bright_lights`]. With a weight of 1, the mirror room with eight strong lights out of 64
+/// see [`bright_lights`]. With a weight of 1, a room of mirrors with eight strong lights out of 64
 /// needs 2.3 times as many rays as with this weight.
 const COMMON_VARIANCE: f64 = 0.25;
 
@@ -42,11 +42,11 @@ const MAX_BRIGHT: usize = 16;
 /// lookup in 16 elements is one instruction.
 const MIN_TABLE: usize = 16;
 
-/// Values of one property of the lights of a stratum.
+/// Values of one property, such as the x coordinate, of the lights of a stratum.
 enum Table<S> {
-    /// Value that all sets share.
+    /// Value of the lights in all sets.
     Common(S),
-    /// Value for each set. Elements beyond the number of sets are never read.
+    /// Value of the light in each set. Elements beyond the number of sets are never read.
     BySet(Vec<S>),
 }
 
@@ -62,11 +62,12 @@ struct Stratum<S> {
     constant: Table<S>,
     /// Red, green and blue emission; 1 in sets without a light of the stratum.
     emission: [Table<S>; 3],
-    /// `None` if all lights emit equally in all directions.
+    /// Cones of the lights; `None` if all lights emit equally in all directions.
     cones: Option<Cones<S>>,
 }
 
-/// Fields of the [`SpotCone`] of each light. The cone of a point light contains all directions.
+/// Cones of the lights of a stratum, with the fields of [`SpotCone`]. The cone of a point light
+/// contains all directions.
 struct Cones<S> {
     axis: [Table<S>; 3],
     outer: Table<S>,
@@ -77,8 +78,8 @@ struct Cones<S> {
 pub(crate) struct LightChoice<S> {
     /// Light group of all lights of this choice.
     pub group: usize,
-    /// Number of sets, a power of two. As many successive samples of a pixel together trace a shadow
-    /// ray to each light once.
+    /// Number of sets, a power of two. This many successive samples of a pixel together trace a
+    /// shadow ray to each light once.
     pub sets: usize,
     strata: Vec<Stratum<S>>,
 }
@@ -221,14 +222,16 @@ impl<S: Float> ChosenSets<'_, S> {
         Vec3::new(x.gather(&self.sets), y.gather(&self.sets), z.gather(&self.sets))
     }
 
-    /// Returns the position of each lane's light in the stratum number `stratum`.
+    /// Returns the positions of the lights that the lanes' sets have in the stratum number
+    /// `stratum`.
     #[inline(always)]
     pub fn positions<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
         self.gather(&self.choice.strata[stratum].positions)
     }
 
-    /// Returns the irradiance by each lane's light of unit emission at normal incidence, divided by
-    /// the probability of the choice. `inverse` is the reciprocal of the distance to the light.
+    /// Returns the irradiance at normal incidence from each lane's light, for unit emission,
+    /// divided by the probability of the choice. `inverse` is the reciprocal of the distance to the
+    /// light.
     #[inline(always)]
     pub fn irradiance<L: SimdFloat<Scalar = S>>(&self, stratum: usize, inverse: L) -> L {
         let count = L::from_f64(self.choice.sets as f64);
@@ -255,7 +258,7 @@ impl<S: Float> ChosenSets<'_, S> {
     }
 }
 
-/// Kinds of lights that are too many in a scene for a shadow ray to each: paths choose a few.
+/// Kinds of lights of which a scene has too many for a shadow ray to each: paths choose a few.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ManyLights {
     /// `true` if the scene has `MIN_LIGHTS` point lights or more.

@@ -7,7 +7,7 @@
 //! that hit the sheet and for points sampled on it.
 //!
 //! The sheet moves to the side on which it is visible. A one-sided sheet moves to its front. A
-//! two-sided sheet on a solid moves outside, or inside if the eye is inside of the solid. A
+//! two-sided sheet on a solid moves outside, or inside if the eye is inside the solid. A
 //! two-sided sheet on an open surface, which has no inside, moves to the side of the eye.
 
 use crate::compile::RecenteredGeometry;
@@ -18,8 +18,8 @@ use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use zerkalo_kernel::primitive::{BoundingSphere, Form, HalfSpace};
 
-/// Distance between an emissive sheet and the surface off which it is moved, in heights of sampled
-/// points above the sheet. This surface then covers no points (see [`CONTACT_LIFTS`]).
+/// Distance between an emissive sheet and the surface off which it is moved. The unit is the height
+/// of sampled points above the sheet. The surface then covers no points (see [`CONTACT_LIFTS`]).
 const GAP_LIFTS: f64 = CONTACT_LIFTS + 2.0;
 
 /// Number of test points for contact along each side of a triangle.
@@ -73,8 +73,8 @@ pub(crate) fn move_off_surfaces(
         let (object, carrier) = if sheets[a].is_some() { (a, b) } else { (b, a) };
         let Some(sheet) = &sheets[object] else { continue };
         let Some(contact) = sheet.contact(&forms[carrier], eye, reach) else { continue };
-        // Transparent surfaces in the plane of the sheet are crossed in a fixed order, from which a
-        // shift would remove the sheet.
+        // A sheet in the plane of a transparent surface is not moved: paths cross both in a fixed
+        // order (see `coincident_surfaces`).
         fixed[object] |= transmits[carrier];
         contacts.entry(object).or_default().push(contact);
     }
@@ -114,8 +114,8 @@ struct Sheet<'a> {
 }
 
 impl<'a> Sheet<'a> {
-    /// Returns `None` if `form` is not flat. Corners of a mesh may be up to `lift` away from a
-    /// common plane.
+    /// Creates the sheet of an object; `None` if `form` is not flat. Corners of a mesh may be up to
+    /// `lift` away from a common plane.
     fn new(form: &'a Form, lift: f64) -> Option<Self> {
         let ball = form.bounding_sphere();
         if let Some(plane) = form.plane() {
@@ -134,7 +134,7 @@ impl<'a> Sheet<'a> {
     }
 
     /// Returns the contact of the sheet with the object `carrier`; `None` if no tested point of the
-    /// sheet is on the object.
+    /// sheet is within `reach` of the object.
     fn contact(&self, carrier: &Form, eye: DVec3, reach: f64) -> Option<Contact> {
         let normal = self.plane.normal;
         for point in points_on(self.form).into_iter().chain(points_on(carrier)) {
@@ -155,7 +155,7 @@ impl<'a> Sheet<'a> {
                 continue;
             };
             // The first surface of the object on the way from the eye to the point shows whether
-            // the eye is inside of the object.
+            // the eye is inside the object.
             let sight = (point - eye).normalize_or(-normal);
             let is_inside = carrier.hit(eye, sight).is_some_and(|(_, n)| n.dot(sight) > 0.0);
             let shows = if is_inside { -outward } else { outward };
@@ -190,7 +190,7 @@ fn may_carry(carrier: &Form, sheet: &Sheet, reach: f64) -> bool {
     }
 }
 
-/// Returns points inside of the faces of a form; none for forms that are not made of triangles.
+/// Returns points inside the faces of a form; none for forms that are not made of triangles.
 fn points_on(form: &Form) -> Vec<DVec3> {
     let triangles = match form {
         Form::Parallelogram(form) => form.halves().to_vec(),

@@ -34,7 +34,7 @@ pub(crate) type EmissiveSource<S> = LightSource<Option<Emitter<S>>, S>;
 /// Emitters of a scene.
 #[derive(Default)]
 pub(crate) struct Emitters<S> {
-    /// In this order: lights with a size, objects whose points are sampled, other emissive objects.
+    /// All emitters: lights with a size, objects whose points are sampled, other emissive objects.
     sources: Vec<EmissiveSource<S>>,
     /// Number of lights with a size.
     lights: usize,
@@ -44,7 +44,7 @@ pub(crate) struct Emitters<S> {
     source_of: Vec<Option<u32>>,
     /// For each sampled object, the objects that touch it.
     touching: Vec<Vec<TouchingObject>>,
-    /// Height of points that are sampled on an emissive object above its surface.
+    /// Height above the surface of an emissive object at which its points are sampled.
     lift: S,
 }
 
@@ -80,7 +80,7 @@ impl<S: Float> Emitters<S> {
                 emitting.push((name, light));
             }
         }
-        // Objects and indices in `emitting` of the primitives whose materials emit.
+        // For a primitive whose material emits: its object, and the material's index in `emitting`.
         let part_of = |id: &PrimitiveId| {
             let name = scene.objects[id.form].materials()[id.part];
             Some((id.form, emitting.iter().position(|(known, _)| *known == name)?))
@@ -177,7 +177,6 @@ impl<S: Float> Emitters<S> {
         covered
     }
 
-    /// Returns `true` if the scene has no emitters.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.sources.is_empty()

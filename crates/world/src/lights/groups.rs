@@ -114,8 +114,8 @@ impl LightGroups {
         }
         let mut emitting: Vec<usize> = (0..scene.lights.len()).collect();
         emitting.retain(|i| contributes(&scene.lights[*i], lit));
-        // Many point lights share one group, because separate sums for seven of them would take a
-        // quarter of the rendering time. So do many spot lights.
+        // Many point lights share one group: separate sums for seven of them would take a quarter
+        // of the rendering time. The same holds for many spot lights.
         let many = ManyLights::new(emitting.iter().map(|i| &scene.lights[*i]));
         let (shared, separate): (Vec<_>, Vec<_>) =
             emitting.into_iter().partition(|i| many.includes(&scene.lights[*i]));
@@ -166,9 +166,8 @@ impl LightGroups {
         })
     }
 
-    /// Returns the factors by which the film's sums of each group are multiplied in the picture of
-    /// `scene`, which may differ from the compiled scene in emissions and on/off switches, ambient
-    /// light and background.
+    /// Returns the light weight of each group in the picture of `scene`, which may differ from the
+    /// compiled scene in emissions and on/off switches, ambient light and background.
     pub fn weights(&self, scene: &Scene) -> Vec<[f64; 3]> {
         self.members.iter().map(|member| member.emission(scene)).collect()
     }

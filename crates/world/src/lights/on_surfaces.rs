@@ -2,10 +2,10 @@
 //!
 //! Shadow rays start a small offset above the surface that they leave. Shadow rays to a light on a
 //! surface end at a similar small offset before that surface, on the side from which they arrive.
-//! The result is the limit of the shadows of a light that approaches the surface from that side.
-//! With an end point at the light itself, rounding would decide whether the surface occludes it.
-//! With an end point a fixed length before the light, a ray at a grazing angle would be occluded by
-//! the surface.
+//! The shadows are the limit of those of a light that approaches the surface from that side. With
+//! an end point at the light itself, rounding would decide whether the surface occludes it. With an
+//! end point a fixed length before the light, a ray at a grazing angle would be occluded by the
+//! surface.
 
 use glam::DVec3;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
