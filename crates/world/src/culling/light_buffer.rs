@@ -59,7 +59,7 @@ pub(crate) struct Occluder {
 struct Entry<S> {
     /// Index of the primitive in [`Aggregate::in_tree`].
     number: u32,
-    /// See [`Occluder::exempt_primitive`]; [`NO_PRIMITIVE`] stands for `None`.
+    /// Value of [`Occluder::exempt_primitive`]; [`NO_PRIMITIVE`] stands for `None`.
     exempt_primitive: u32,
     /// Smallest depth of the primitive's bounding sphere. The depth of a point is its distance from
     /// a point light. For a directional light it is the coordinate along the direction in which the
@@ -323,7 +323,7 @@ mod tests {
         }
     }
 
-    /// Checks that the far side of a ball occludes light from points inside of the ball.
+    /// Checks that the far side of a ball occludes light from points inside the ball.
     #[test]
     fn shadow_ray_from_inside_is_occluded_by_its_own_primitive() {
         let balls = [

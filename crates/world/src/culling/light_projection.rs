@@ -14,7 +14,7 @@ const MAX_TANGENT: f64 = 3.0;
 
 /// Projection of points, as seen from a light, onto one or more faces with coordinates from 0 to 1.
 pub(crate) enum LightProjection<S> {
-    /// For a point light that has primitives on several sides.
+    /// Cube map, for a point light that has primitives on several sides.
     CubeMap,
     /// Perspective projection for a point light that has all primitives on one side, or
     /// orthographic projection for a directional light. The third axis points away from the light.

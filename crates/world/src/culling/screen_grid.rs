@@ -105,7 +105,7 @@ impl ScreenGrid {
         let [columns, rows] = size.map(|n| n.div_ceil(CELL_PX));
         let mut candidates = vec![Some(Vec::new()); columns * rows];
         for (primitive, ScreenBounds { low, high }) in primitives {
-            // The conversion to an integer saturates, so bounds outside of the raster overlap no
+            // The conversion to an integer saturates, so bounds outside the raster overlap no
             // cell.
             let cell = |x: f64| (x / CELL_PX as f64).floor().max(-1.0) + 1.0;
             let span = |axis: usize, count: usize| {

@@ -26,7 +26,7 @@ pub(crate) struct Occluders {
     pub strata: Vec<PrimitiveSet>,
 }
 
-/// Places of the lights that have lists of possible occluders.
+/// Bounds of the lights that have lists of possible occluders.
 pub(crate) struct LightBounds {
     pub delta_lights: Vec<LightTarget>,
     /// Largest distance between a light without a size and the end point of its shadow rays.
@@ -57,7 +57,7 @@ pub(crate) enum CullingMode {
     ScreenBounds(Vec<ScreenBounds>),
     /// Looks up the screen cells that the tile overlaps. The primitives are in a BVH.
     ScreenGrid(ScreenGrid),
-    /// All primitives are candidates. Rays find those in a BVH by traversal.
+    /// No culling: all primitives are candidates. Rays find those in a BVH by traversal.
     Off,
 }
 
@@ -110,13 +110,14 @@ impl<S: Float> Culling<S> {
 pub(crate) struct FrustumCuller {
     bounds: Vec<BoundingVolume>,
     /// `true` for each primitive that may occlude lights from points on its own surface: it is
-    /// concave, or paths can be inside of it.
+    /// concave, or paths can be inside it.
     self_shadowing: Vec<bool>,
     lights: LightBounds,
 }
 
 impl FrustumCuller {
-    /// Creates the culler of the primitives `forms`. `outside_only` is the field of `World`.
+    /// Creates the culler of the primitives `forms`. `outside_only` is `true` for those that rays
+    /// hit only from outside.
     pub fn new(forms: Vec<&Form>, outside_only: &[bool], lights: LightBounds) -> Self {
         let bound = |form: &Form| BoundingVolume::new(form).grown(lights.max_end_offset);
         let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();
