@@ -4,7 +4,7 @@ use glam::DVec3;
 use zerkalo_kernel::primitive::Form;
 
 /// Returns a lower bound of the distance between `point` and the closest surface of the objects
-/// `forms`. See [`CanonicalShape::clearance`](zerkalo_kernel::primitive::CanonicalShape::clearance).
+/// `forms`: the minimum of `CanonicalShape::clearance`.
 pub(crate) fn clearance(forms: &[Form], point: DVec3) -> f64 {
     forms.iter().filter_map(|form| form.clearance(point)).fold(f64::INFINITY, f64::min)
 }
@@ -47,7 +47,7 @@ mod tests {
         near(cylinder, [1.9, 0.0, 0.0], 0.1);
         near(cylinder, [0.0, 4.75, 0.5], 0.25);
         near(cylinder, [0.0, 0.0, 0.0], 2.0);
-        // Inside of the bounding box, but outside of the cylinder.
+        // Inside the bounding box, but outside the cylinder.
         let corner = (2.0 * 0.95f64.powi(2) * 4.0).sqrt() - 2.0;
         near(cylinder, [1.9, 0.0, 1.9], corner);
         let cone = &forms(

@@ -93,8 +93,8 @@ pub(crate) fn single_suffices(scene: &Scene, geometry: &RecenteredGeometry) -> b
 /// Gap between two faces of different objects, at the point where they are closest.
 struct Clearance {
     width: f64,
-    /// Point at which a gap that widens around it is narrowest, and the radius of the sphere that
-    /// has the same gap to a plane. `None` if the faces are parallel planes.
+    /// Point at which the gap is narrowest, and the radius of a sphere whose gap to a plane widens
+    /// as fast. `None` if the faces are parallel planes.
     round: Option<(DVec3, f64)>,
 }
 
@@ -139,7 +139,7 @@ fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
     }
 }
 
-/// Returns `true` if two objects have a gap that [`Clearance::is_seen`].
+/// Returns `true` if any two objects have a visible gap, as [`Clearance::is_seen`] defines it.
 fn has_gap(forms: &[Form], narrow: Range<f64>, pixel: impl Fn(DVec3) -> f64) -> bool {
     let seen = |a: &ProxyFace, b: &ProxyFace| {
         gaps(a, b).iter().flatten().any(|gap| gap.is_seen(&narrow, &pixel))

@@ -5,9 +5,8 @@
 //! rounded to whole steps. If all samples of a pixel are equal, their mean has an error of up to
 //! half a step, which more samples do not reduce. The size of a step therefore has two bounds:
 //!
-//! - *The dim end.* The darkest 8-bit level of a display is 2^-11.7 of white. A surface whose
-//!   brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
-//!   levels.
+//! - *The dim end.* The darkest 8-bit level of a display is 2^-11.7 of white. If the brightest spot
+//!   of a surface is white and has 2^16 steps, that level has 20, and rounding costs 0.03 levels.
 //! - *The bright end.* With 2^44 steps for the brightest spot, a pixel that shows only this spot
 //!   holds 2^19 samples in each replicate before its sum saturates. Five bits remain for single
 //!   samples that are brighter.
@@ -130,13 +129,14 @@ struct Response {
 impl Response {
     const WHITE: Self = Self { least: 1.0, most: 1.0, peak: 1.0 };
 
-    /// Returns `None` if the material reflects no direct light.
+    /// Computes the factors of `material`; `None` if it reflects no direct light.
     fn new(material: &Material) -> Option<Self> {
         let diffuse = material.color.0.map(|c| c * material.diffuse);
         let specular = material.specular;
         let highlight = match material.highlight {
             Highlight::Phong => 1.0,
-            // D F G / 4 of microfacets at normal incidence and view, with D = 1 / (pi alpha^2).
+            // Microfacet BRDF at normal incidence and view, relative to the 1 / pi of a white
+            // diffuse surface: D F G / 4 with D = 1 / (pi alpha^2), F and G at most 1.
             Highlight::CookTorrance => 0.25 / material.microfacet_alpha().max(SMOOTH_ALPHA).powi(2),
         };
         let most = diffuse.into_iter().fold(0.0, f64::max) + specular;
@@ -169,10 +169,10 @@ fn distance_to_box(bounds: Bounds, point: DVec3) -> f64 {
 /// Light whose irradiance depends on the distance from it.
 struct LitBy {
     center: DVec3,
-    /// Radius of a sphere around the light; 0 for a light without a size.
+    /// Radius of the light's bounding sphere; 0 for a light without a size.
     radius: f64,
-    /// Smallest distance of surfaces that counts. Nearer surfaces count as at this distance, except
-    /// in `spots`.
+    /// Smallest distance of surfaces that counts. Nearer surfaces count as if they were at this
+    /// distance, except for the estimate `spots`.
     min_distance: f64,
     /// Largest distance at which the light counts as on a surface; negative if it never does.
     min_clearance: f64,
@@ -185,15 +185,15 @@ pub(crate) struct SceneDistances<'a> {
     /// Direct light that each object reflects, over all its parts, relative to a white diffuse
     /// surface; `None` if it reflects none.
     responses: Vec<Option<Response>>,
-    /// Factors of ambient light.
+    /// Factors by which materials reflect ambient light.
     ambient: Response,
-    /// Smallest factor, at most 1, by which mirrors and glass that reflect no direct light pass on
-    /// light.
+    /// Smallest factor, at most 1, by which pure mirrors and glass, which reflect no direct light,
+    /// multiply the light that they pass on.
     faintest: f64,
     /// Largest factor, at least 1, by which all mirrors of a path together multiply light.
     gain: f64,
-    /// Smallest distance from the scene's centre. For the typical radiance, nearer lights count as
-    /// at this distance.
+    /// Smallest distance of lights from the scene's centre, for the typical radiance. Nearer lights
+    /// count as if they were at this distance.
     radius: f64,
     /// Position of the eye, and the side of a pixel at unit distance from it.
     eye: (DVec3, f64),
@@ -306,8 +306,8 @@ impl<'a> SceneDistances<'a> {
         }
         // An infinitely distant disk gives a facing surface the irradiance pi.
         let range = self.range_of(1.0, self.response());
-        // The angular radius, of whose sine `emitted` is the inverse square, is compared with a
-        // quarter of a pixel.
+        // `emitted` is 1 / sin^2 of the disk's angular radius. The sine is compared with a quarter
+        // of a pixel.
         let is_wide = emitted.sqrt().recip() > 0.25 * self.eye.1;
         if visible { self.seen(range, emitted, is_wide) } else { range }
     }

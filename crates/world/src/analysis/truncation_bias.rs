@@ -8,7 +8,8 @@ use zerkalo_scene::material::{Fresnel, Material, Texture};
 use zerkalo_scene::shape::Shape;
 use zerkalo_scene::{Object, RayTypes, Scene};
 
-/// Returns the largest fraction of light that a material reflects and transmits together.
+/// Returns the largest fraction of light that a material reflects and transmits together. On a
+/// `flat` object there is no total internal reflection.
 fn max_albedo(material: &Material, flat: bool) -> f64 {
     let (k_r, k_t) = (material.reflection, material.transmission);
     let f = match material.fresnel_mode() {
@@ -45,7 +46,7 @@ fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
 /// extent.
 const ROUNDING: f64 = 1e-6;
 
-/// Returns `true` if camera rays may start inside of the object `form`.
+/// Returns `true` if camera rays may start inside the object `form`.
 fn contains_eye(form: &Form, scene: &Scene) -> bool {
     let eye = DVec3::from(scene.camera.eye);
     let lens_radius = scene.camera.lens_radius();
@@ -108,7 +109,8 @@ impl Reach {
         Self { first, round_trip_albedo, through }
     }
 
-    /// Returns w(n) of [`truncation_bounds`].
+    /// Returns w(n) of [`truncation_bounds`]: the largest sum of the throughputs of a path's
+    /// branches that have hit `n` surfaces.
     fn weight(&self, n: u32) -> f64 {
         let pairs = self.round_trip_albedo.powi(i32::try_from(n / 2).unwrap_or(i32::MAX));
         if n.is_multiple_of(2) { pairs } else { pairs * self.first }
