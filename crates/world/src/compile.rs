@@ -28,7 +28,7 @@ use zerkalo_scene::{Acceleration, BelowHorizon, Filter, IntegratorSettings, RayT
 
 /// Geometry of all objects in double precision, relative to the scene's centre.
 pub(crate) struct RecenteredGeometry {
-    /// The scene's centre.
+    /// The scene's centre: that of the box around all bounded shapes, or else the eye.
     pub origin: DVec3,
     /// Canonical form of each object, with its transform applied.
     pub forms: Vec<Form>,
@@ -161,9 +161,10 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     }
 }
 
-/// Height of lights with a size above the surfaces that they touch. The unit is the larger of two
-/// rounding errors: the error at the scene's extent, and the error of the coordinates in the scene
-/// file. Rays that leave a surface start at about half this height, so that they can hit the light.
+/// Height by which lights with a size are moved off the surfaces that they touch. The unit is the
+/// larger of two rounding errors: the error at the scene's extent, and the error of the coordinates
+/// in the scene file. Rays that leave a surface start at about half this height, so that they can
+/// hit the light.
 const EMITTER_LIFT: f64 = 16.0;
 
 /// Returns the height at which points are sampled above emissive objects, and by which lights with
@@ -172,14 +173,13 @@ fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
     EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
 }
 
-/// Largest lift of a light that is a sphere or whose centre is on no surface, as a fraction of
-/// [`EmissiveSurface::thickness`].
+/// Largest distance by which [`light_lift`] moves a light that is a sphere or whose centre is on no
+/// surface. The unit is the light's [`EmissiveSurface::thickness`].
 const MAX_LIFT: f64 = 1e-4;
 
 /// Returns the distance by which a light with the surface `surface` is moved off the surfaces that
-/// it touches. Infinite surfaces are not part of the scene's extent, so that the coordinates of a
-/// light on one of them may exceed the extent. The rounding error of the light's own coordinates
-/// then counts as well.
+/// it touches. On an infinite surface, which is no part of the scene's extent, the rounding error
+/// of the light's own coordinates counts as well.
 fn light_lift<S: Float>(geometry: &RecenteredGeometry, surface: &EmissiveSurface) -> f64 {
     let lift = emitter_lift::<S>(geometry);
     let center = surface.center() - geometry.origin;
@@ -214,7 +214,7 @@ pub(super) struct CompiledLights<S> {
 }
 
 impl<S: Float> CompiledLights<S> {
-    /// Compiles the lights in `groups`. Returns them, and the scale of each group.
+    /// Compiles the lights in `groups`. Returns them, and each group's [scale](WorldInfo::scales).
     fn new(
         scene: &Scene,
         geometry: &RecenteredGeometry,
@@ -276,7 +276,7 @@ impl<S: Float> CompiledLights<S> {
         !self.emitters.is_empty() || !self.environments.is_empty()
     }
 
-    /// Returns the places of the lights, for which culling lists possible occluders.
+    /// Returns the bounds of the lights, for each of which culling lists the possible occluders.
     fn bounds(&self) -> LightBounds {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let target_of = |source: &DeltaSource<S>| match &source.light.light {
@@ -341,7 +341,7 @@ fn culling<L: SimdFloat>(
 }
 
 /// Returns for each primitive whether it is a convex solid that rays hit only from outside. Paths
-/// are inside of a solid only if they start there or are transmitted. `start` is a sphere around
+/// are inside a solid only if they start there or are transmitted. `start` is a sphere around
 /// the origins of camera rays.
 fn outside_only<L: SimdFloat>(
     forms: &[Form],

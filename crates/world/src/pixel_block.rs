@@ -1,6 +1,6 @@
 //! Block of pixels: values that are the same for all samples of a pixel, computed once per tile.
-//! They are the key of the pixel's random numbers, and the vector from the eye to its upper left
-//! corner.
+//! They are the key of the pixel's random numbers, and the vector from the eye to the pixel's upper
+//! left corner.
 
 use std::ops::Range;
 use zerkalo_kernel::lanes::{Float, SimdFloat, SimdU32, Vec3};
@@ -14,7 +14,7 @@ pub const MAX_BLOCK_PIXELS: usize = 256;
 /// last pixel.
 pub(super) struct PixelBlock<S> {
     count: usize,
-    /// See [`Sampler::key`].
+    /// Key of each pixel's random numbers, computed by [`Sampler::key`].
     keys: [u32; MAX_BLOCK_PIXELS],
     /// Vectors from the eye to the pixels' upper left corners on the plane at unit distance: all x,
     /// then y, then z.
@@ -56,7 +56,6 @@ impl<S: Float> PixelBlock<S> {
         out
     }
 
-    /// Returns the number of pixels.
     pub fn len(&self) -> usize {
         self.count
     }

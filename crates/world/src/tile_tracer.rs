@@ -85,8 +85,7 @@ impl<L: SimdFloat> TileTracer<'_, L> {
     /// Traces the samples `first..first + COUNT` of every pixel and passes the radiance of each
     /// packet to `sink`, with the range of its pixels in the list of all pixels. A packet holds
     /// samples of `WIDTH / COUNT` pixels; its pixel `i` occupies the `COUNT` lanes from `i * COUNT`
-    /// on. `COUNT` must be a power of two below `WIDTH`, and
-    /// `first` a multiple of `COUNT`.
+    /// on. `COUNT` must be a power of two below `WIDTH`, and `first` a multiple of `COUNT`.
     #[inline(always)]
     pub fn radiance_shared<const COUNT: usize>(
         &mut self,
@@ -129,7 +128,6 @@ impl<L: SimdFloat> TileTracer<'_, L> {
     }
 }
 
-/// Returns the mask of the first `count` lanes.
 fn first_lanes<L: SimdFloat>(count: usize) -> L::Mask {
     if count == L::WIDTH {
         return L::mask(true);

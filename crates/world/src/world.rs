@@ -20,9 +20,9 @@ pub(super) struct LightSource<T, S> {
     /// Index of the light group.
     pub group: usize,
     /// Emission, colour times intensity, of a light that shares its group. `None` for a light with
-    /// a group of its own, whose samples are white.
+    /// a group of its own, which is traced as white light of intensity 1.
     pub emission: Option<[S; 3]>,
-    /// `true` if the camera and reflected rays see the light, which must have a size.
+    /// `true` if the camera and reflected rays see the light; not used for lights without a size.
     pub visible: bool,
 }
 
@@ -85,11 +85,11 @@ pub struct World<L: SimdFloat> {
     pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
     /// Largest number of surfaces on a path after the first; 0 if no surface reflects or transmits.
     pub(super) depth: u32,
-    /// `None` if the scene has no indirect diffuse light.
+    /// Limits of indirect diffuse light; `None` if the scene has none.
     pub(super) diffuse_limits: Option<DiffuseLimits>,
     /// Smallest throughput, in its largest channel, with which a path continues.
     pub(super) min_throughput: f64,
-    /// See [`BsdfQuery::fold`](zerkalo_scene::material::BsdfQuery::fold).
+    /// `true` if sampled reflections below the horizon are mirrored, `false` if they are absorbed.
     pub(super) fold: bool,
     /// Camera, in coordinates relative to the scene's centre.
     pub camera: PerspectiveCamera,
@@ -135,7 +135,7 @@ impl<L: SimdFloat> World<L> {
             && !self.lights.environments.iter().any(|source| source.visible)
     }
 
-    /// Returns the lanes whose paths continue with `throughput`.
+    /// Returns the lanes in which `throughput` is large enough for the path to continue.
     #[inline(always)]
     pub(super) fn reaches_min_throughput(&self, throughput: Vec3<L>) -> L::Mask {
         let max_throughput = throughput.max_element();
