@@ -61,8 +61,8 @@ pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
     around_axis(unit(axis).unwrap_or(DVec3::Y))
 }
 
-/// Returns the errors of `checks`, of an axis without length, and of coordinates that are too large
-/// for the axis or one of `sizes`. `name` is the key of `top`.
+/// Returns the errors of `checks`, of an axis without length, and of coordinates that are more than
+/// 1e12 times the axis or one of `sizes`. `name` is the key of `top`.
 pub(super) fn axis_faults(
     checks: Validator,
     [base, top]: [[f64; 3]; 2],

@@ -218,7 +218,7 @@ impl Shape {
         }
     }
 
-    /// Returns the material names of all parts, nested ones too. Names may be empty.
+    /// Returns the material names of all parts, including nested parts. Names may be empty.
     pub fn part_names_mut(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
         for part in self.parts_mut() {
@@ -228,12 +228,12 @@ impl Shape {
         names
     }
 
-    /// Returns `true` if a part of the shape, nested ones too, names the material `name`.
+    /// Returns `true` if a part of the shape, even a nested one, names the material `name`.
     pub fn names_material(&self, name: &str) -> bool {
         self.named_materials().iter().any(|(_, own)| *own == name)
     }
 
-    /// Returns the materials that the parts of the shape, nested ones too, name.
+    /// Returns the materials that the parts of the shape name, including nested parts.
     pub fn named_materials(&self) -> Vec<Named<'_>> {
         let mut named = Vec::new();
         for (i, part) in self.parts().into_iter().flatten().enumerate() {

@@ -7,8 +7,8 @@ use glam::{DVec2, DVec3};
 use zerkalo_kernel::primitive::Form;
 
 description! {
-    /// A right prism on a base with three equal sides. Without a rotation, the base has an edge along +x from
-    /// `corner` and its third vertex towards -z.
+    /// A right prism on a base with three equal sides. Without a rotation, the base has an edge
+    /// along +x from `corner` and its third vertex towards -z.
     pub struct Prism {
         /// Lower left near corner of the base, before the rotation (near is +z).
         corner: [f64; 3], in COORDINATE "scene units";

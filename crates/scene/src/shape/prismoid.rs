@@ -45,7 +45,7 @@ pub(super) fn prismoid(
     let centroid = base.iter().sum::<DVec2>() / base.len() as f64;
     let (sin, cos) = sin_cos_degrees(rotation);
     let rotated = |v: DVec2| DVec2::new(v.x * cos + v.y * sin, v.y * cos - v.x * sin);
-    // For offsets from `corner`, (b - c) + c is exact, so that an unrotated cube keeps its corners.
+    // Relative to `corner`, (b - centroid) + centroid is exact: an unrotated cube stays exact.
     let corner_at = |scale: f64, b: DVec2, y: f64| {
         let offset = centroid + rotated(b - centroid) * scale;
         corner + DVec3::new(offset.x, y, offset.y)
@@ -67,7 +67,7 @@ pub(super) fn prismoid(
         let across = (end - start).perp().normalize();
         let apothem = across.dot(start - centroid);
         let outward = rotated(across * apothem.signum());
-        // At height y the side has the distance `apothem (1 - (1 - top_over_base) y / height)`.
+        // At height y a side is `apothem (1 - (1 - top_over_base) y / height)` away from the axis.
         let up = apothem.abs() * (1.0 - top_over_base) / height;
         let normal = DVec3::new(outward.x, up, outward.y).normalize();
         faces.push(through(corners[i], normal));

@@ -5,8 +5,8 @@ use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo_kernel::primitive::Projection;
 
-/// Texture space of a shape that is no compound: x to the right, y up or along the axis, z to the
-/// front or along the normal, in scene units before the object's transform.
+/// Texture space of a shape that is no compound, in scene units before the object's transform. Its
+/// x points to the right, y up or along the shape's axis, z to the front or along the normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureSpace {
     /// Map from texture space to the space of the shape, or of the whole compound.
@@ -29,7 +29,7 @@ impl TextureSpace {
         Self { shape_from_texture, corners: corners.into(), default_mapping }
     }
 
-    /// Returns `true` for bounded flat shapes, and for meshes whose file has texture coordinates.
+    /// Returns `true` for shapes with (u, v) coordinates: bounded flat ones, and meshes with them.
     pub fn has_uv(&self) -> bool {
         let [low, high] = self.corners;
         match self.default_mapping {
