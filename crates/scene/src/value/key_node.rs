@@ -85,7 +85,7 @@ pub trait KeyNode {
     }
 }
 
-/// Optional value.
+/// Node of an optional value; `None` is absent.
 impl<T: KeyNode + Default> KeyNode for Option<T> {
     fn value(&self) -> Option<KeyValue> {
         self.as_ref()?.value()
@@ -121,7 +121,7 @@ impl<T: KeyNode + Default> KeyNode for Option<T> {
     }
 }
 
-/// List of tables.
+/// Node of a list of tables; its children have indices as keys.
 impl<T: KeyNode + Default> KeyNode for Vec<T> {
     fn is_absent(&self) -> bool {
         self.is_empty()
@@ -148,7 +148,7 @@ impl<T: KeyNode + Default> KeyNode for Vec<T> {
     }
 }
 
-/// Named tables.
+/// Node of named tables; its children have their names as keys.
 impl<T: KeyNode + Default> KeyNode for BTreeMap<String, T> {
     fn child(&self, name: &str) -> Option<&dyn KeyNode> {
         Some(self.get(name)?)

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Interval of finite numbers; NaN and the infinities are outside of every interval.
+/// Interval of finite numbers; NaN and the infinities are outside every interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NumberRange {
     /// Lower bound of the interval; negative infinity for none.
