@@ -4,7 +4,7 @@
 use crate::value::sort_by_number;
 use toml_edit::{DocumentMut, Item, Table};
 
-/// Comments above removed tables that belong to the file and therefore stay.
+/// Comments that stand above removed tables but belong to the file, and therefore stay.
 #[derive(Default)]
 pub(crate) struct CommentKeeper {
     /// Position of the removed table below each comment, and the text of the comment.

@@ -21,7 +21,7 @@ pub(crate) struct Part {
 enum Header {
     /// Header of an object: `[[object]]`.
     Object,
-    /// Header of a table inside of the previous object, such as `[object.shape]`.
+    /// Header of a table inside the previous object, such as `[object.shape]`.
     InObject,
     Other,
 }
@@ -64,7 +64,7 @@ impl Part {
 /// Divides a file into parts. The first has everything except the objects. Each of the others has
 /// consecutive objects, up to the one with which it reaches `part_bytes` bytes. A file has a single
 /// part if it is short, if it has no objects, if a table of an object follows a section of another
-/// kind, or if a line may only look like the beginning of a section.
+/// kind, or if a line that looks like a header may be part of a string or a list.
 pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
     let sections = sections(text).unwrap_or_default();
     let objects = sections.iter().filter(|(_, header)| *header == Header::Object).count();

@@ -192,8 +192,8 @@ fn patch_list(
     }
 }
 
-/// Renames the inner tables of `table` whose value has one name only in `old` and another name only
-/// in `new`, so that their text is kept. Returns `old` with the new names.
+/// Renames the inner tables of `table` that an edit has renamed: `new` has an equal value under a
+/// new name. Their text is kept. Returns `old` with the new names.
 fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
     let mut renamed = old.clone();
     for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
@@ -214,8 +214,8 @@ fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> to
     renamed
 }
 
-/// Removes the comment after the last comma of `list` and returns it. Returns an empty string, and
-/// removes nothing, if there is none or `followed` is `false`.
+/// Removes the comment after the last comma of `list` and returns it; an empty string if there is
+/// none. If `followed` is `false`, the comment stays at the end of the list.
 fn comment_of_the_last(list: &mut toml_edit::Array, followed: bool) -> String {
     let trailing = list.trailing().as_str().unwrap_or_default();
     match trailing.rfind('\n') {

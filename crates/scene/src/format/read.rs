@@ -67,7 +67,7 @@ impl<'a> SourceScene<'a> {
     ) -> Result<Self, SceneErrors> {
         let mut source = Self { scene: Scene::default(), name, text, parts };
         if !source.read_parts()? {
-            // Objects outside of sections belong to the same list: the file is parsed as a whole.
+            // Objects outside sections belong to the same list: the file is parsed as a whole.
             return Self::parse_parts(text, name, resolver, vec![Part::whole(text)]);
         }
         source.scene.resolver = resolver;
