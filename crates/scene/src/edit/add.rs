@@ -105,8 +105,8 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
 }
 
 /// Returns the length of a new object, rounded to one digit. It is 0.6 times the median length of
-/// the solids, a length that is first limited to 0.01 R to R, where R is the radius of the scene.
-/// It is 0.15 R without solids, and 0.6 in an empty scene.
+/// the solids, after that median is limited to the range from 0.01 R to R. R is the radius of
+/// [`scene_bounds`]. It is 0.15 R without solids, and 0.6 in an empty scene.
 fn usual_size(scene: &Scene) -> f64 {
     let radius = scene_bounds(scene).radius;
     let solid = |object: &Object| {

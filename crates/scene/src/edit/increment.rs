@@ -223,7 +223,7 @@ fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> 
     within(moved, range, x)
 }
 
-/// Mantissas of coarse steps, in thousandths. Successive ones differ by about a tenth.
+/// Rungs of coarse steps: their mantissas, in thousandths. Successive ones differ by about a tenth.
 const RUNGS: [i64; 23] = [
     1000, 1100, 1200, 1300, 1400, 1600, 1800, 2000, 2200, 2500, 2800, 3000, 3300, 3600, 4000, 4500,
     5000, 5500, 6000, 6500, 7000, 8000, 9000,
@@ -235,8 +235,8 @@ fn fine_rungs() -> Vec<i64> {
     parts.into_iter().flatten().collect()
 }
 
-/// Returns the number that is `steps` rungs above `x`, which is at least 0. The result is a rung or
-/// an end of `range`, so that steps up and down undo each other.
+/// Returns the number that is `steps` rungs above `x`, which is at least 0. The result is 0, a rung
+/// of at least `floor`, or an end of `range`, so that steps up and down undo each other.
 fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let up = steps > 0;
     let mut x = x;

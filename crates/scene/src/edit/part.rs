@@ -41,7 +41,7 @@ pub(super) fn part_mut<'a>(
     part.ok_or_else(|| EditError::gone(target))
 }
 
-/// Returns the one of the [`exclusive_keys`] that is given; `None` if none is.
+/// Returns which of the [`exclusive_keys`] is given; `None` if none is.
 pub(super) fn given_key(part: &dyn KeyNode, target: &Target) -> Option<&'static str> {
     let is_given = |key: &&&str| part.child(key).is_some_and(|node| !node.is_absent());
     exclusive_keys(target).iter().find(is_given).copied()

@@ -187,7 +187,7 @@ impl PropertyWalker<'_> {
             }
         }
         if let ValueType::Tables(_) = field.takes {
-            // Edits can only read the parts of a compound.
+            // The parts of a compound are shown as text, because edits cannot change them.
             row.value = written(field.takes, node).to_string();
         }
         self.rows.push(row);
@@ -230,7 +230,7 @@ impl PropertyWalker<'_> {
     }
 }
 
-/// Returns the field of the kind that `node` has, and the node of the kind's value.
+/// Returns the field of the kind that `node` has, and the child of `node` with the kind's value.
 fn given_kind<'a>(
     kinds: &'static [Field],
     node: &'a dyn KeyNode,

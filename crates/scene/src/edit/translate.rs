@@ -74,7 +74,6 @@ fn move_camera(camera: &mut Camera, by: [f64; 3]) {
     camera.target = camera.target.map(|target| moved(target, by));
 }
 
-/// Moves a light as [`move_by`] describes.
 fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
     let handles = light.kind.handles();
     if let Some(position) = handles.position {
