@@ -65,7 +65,7 @@ pub(super) struct FirstDiagnostics {
 }
 
 impl FirstDiagnostics {
-    /// Adds the diagnostic that `make` returns without file, line and column, at byte offset `at`.
+    /// Adds a diagnostic at byte offset `at`. `make` returns it without file, line and column.
     pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
         if self.skips(at) {
             return;
@@ -76,7 +76,7 @@ impl FirstDiagnostics {
         }
     }
 
-    /// Returns `true` if a diagnostic at `at` would only be counted, and counts it.
+    /// Returns `true` if a diagnostic at `at` is not to be stored; it is counted instead.
     pub fn skips(&mut self, at: usize) -> bool {
         let skips = self.last.is_some_and(|last| at > last);
         self.more += usize::from(skips);
@@ -92,7 +92,6 @@ impl FirstDiagnostics {
         }
     }
 
-    /// Returns `true` if no diagnostic about the scene file was added.
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
     }

@@ -20,7 +20,7 @@ pub struct Document {
     /// Text and scene as read. Each change starts from a copy of them, so that undoing a removal
     /// restores its comments.
     origin: (Arc<String>, Arc<Scene>),
-    /// Located [`Scene::warnings`] about the file as it was read.
+    /// Warnings about the file as it was read ([`Scene::warnings`]), with line and column.
     pub warnings: Vec<Diagnostic>,
     text: Arc<String>,
     scene: Arc<Scene>,

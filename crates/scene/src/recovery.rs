@@ -31,7 +31,8 @@ const STALE_AFTER: Duration = Duration::from_secs(60);
 pub struct Recovery {
     /// Folder of the scene file, and name of the recovery file in it; `None` without a scene file.
     beside: Option<(PathBuf, OsString)>,
-    /// State folder, and name of the file in it if it cannot be written `beside` the scene.
+    /// State folder, for files that cannot be written `beside` the scene, and name of the file in
+    /// it.
     state: Option<(PathBuf, OsString)>,
     saved: Option<Saved>,
 }

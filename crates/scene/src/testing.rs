@@ -6,7 +6,6 @@ use crate::Scene;
 pub const MIRROR_ROOM: &str =
     include_str!(concat!(env!("ZERKALO_ROOT"), "scenes/mirror-room.toml"));
 
-/// Returns the mirror room.
 pub fn mirror_room() -> Scene {
     Scene::parse(MIRROR_ROOM, "mirror-room.toml").unwrap_or_else(|e| panic!("{e}"))
 }
