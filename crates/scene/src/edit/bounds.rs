@@ -75,7 +75,8 @@ pub fn step_length(scene: &Scene) -> f64 {
 
 /// Returns the distance, greater than 0, from the eye to the pivot of camera movements. The pivot
 /// is the target or, without one, the point of the view axis closest to the centre of
-/// [`scene_bounds`]. If it is not well ahead, the distance is the radius of [`scene_bounds`].
+/// [`scene_bounds`]. If this point is less than a tenth of the radius ahead, the distance is the
+/// radius.
 pub fn pivot_distance(scene: &Scene) -> f64 {
     let eye = DVec3::from_array(scene.camera.eye);
     if let Some(target) = scene.camera.target {

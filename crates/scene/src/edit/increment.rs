@@ -183,7 +183,8 @@ impl StepRule {
             }
             Step::Units(unit) => {
                 let moved = added(x, unit, count);
-                // A fine step inside an end that the range excludes, such as 180 degrees.
+                // Numbers stay a fine step away from an end that the range excludes, such as 180
+                // degrees.
                 let margin = |is_in: bool| if is_in { 0.0 } else { 0.1 * unit };
                 let low = range.low + margin(range.low_in);
                 let high = range.high - margin(range.high_in);

@@ -18,8 +18,8 @@ pub struct Word {
     pub doc: String,
 }
 
-/// Input element for the value of a property in an inspector. Choices, kinds and lists take
-/// [`Property::words`].
+/// Input element for the value of a property in an inspector. Choices, kinds and lists accept the
+/// words in [`Property::words`].
 #[allow(missing_docs, reason = "the names say it")]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Widget {

@@ -82,7 +82,7 @@ fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
         let reach = 3.0 * scene_bounds(scene).radius;
         let lamp = -unit(*direction).unwrap_or(DVec3::NEG_Y) * reach;
         let lamp = lamp + DVec3::from_array(by);
-        // A lamp at the origin has no direction to it.
+        // A lamp at the origin cannot be aimed at the origin.
         if let Some(aimed) = unit(-lamp) {
             *direction = aimed.map(|x| rounded_to(x, -4)).to_array();
         }
