@@ -63,7 +63,6 @@ fn properties(entry: &Value) -> Vec<Property> {
 
 /// Old entries that are not an origin yet.
 struct Free {
-    /// Properties of each entry.
     entries: Vec<Vec<Property>>,
     /// Indices of the entries with each property.
     indices: HashMap<Property, BTreeSet<usize>>,

@@ -109,7 +109,6 @@ struct Sheet<'a> {
     plane: HalfSpace,
     /// `true` if all parts of the sheet have their fronts on the same side.
     has_front: bool,
-    /// Sphere around the sheet.
     ball: BoundingSphere,
 }
 
