@@ -1,6 +1,6 @@
 //! zerkalo: a progressive, accumulating ray tracer with a dashboard in the terminal.
 //!
-//! The application. ARCHITECTURE.md lists the crates of the library.
+//! This crate is the application. ARCHITECTURE.md describes the crates below it.
 
 pub mod command;
 pub mod dashboard;

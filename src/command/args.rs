@@ -315,8 +315,8 @@ const PRECISIONS: [Choice<Precision>; 3] = [
     ("auto", Some("32-bit or 64-bit floats, chosen by the scene's proportions"), Precision::Auto),
 ];
 
-/// The alias hides the `Option` from clap, for which it means an argument that may be absent.
-/// `None` is `auto`.
+/// Colours of `--color`; `None` is `auto`. The alias hides the `Option` from clap, for which it
+/// means an argument that may be absent.
 type ColorChoice = Option<Colors>;
 
 const COLORS: [Choice<ColorChoice>; 5] = [
@@ -377,7 +377,7 @@ impl PictureArgs {
     }
 }
 
-/// Name, help and value of an option.
+/// Possible value of an option: its name, its help text and the parsed value.
 type Choice<T> = (&'static str, Option<&'static str>, T);
 
 fn choice<T, const N: usize>(choices: [Choice<T>; N]) -> impl TypedValueParser<Value = T>
@@ -414,7 +414,7 @@ fn exposure(text: &str) -> Result<f64, String> {
     number(text, |x| x.abs() <= 64.0, "a number from -64 to 64")
 }
 
-/// Units of memory sizes in bytes.
+/// Units of memory sizes: name and number of bytes.
 const MEMORY_UNITS: [(&str, f64); 6] = [
     ("KB", 1e3),
     ("MB", 1e6),

@@ -1,4 +1,4 @@
-//! Test of the processor for the features for which the program was compiled.
+//! Test of the processor for the features that the compiled program uses.
 //!
 //! The build names a processor (see `.cargo/config.toml`), and the compiler may use all of its
 //! features anywhere. On an older processor the program would stop with an illegal instruction at

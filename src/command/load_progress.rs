@@ -11,7 +11,7 @@ const LARGE_FILE_BYTES: u64 = 8 << 20;
 /// Number of triangles of a mesh above which building its BVH is reported.
 const LARGE_MESH_TRIANGLES: usize = 200_000;
 
-/// Asset cache that reports large files on stderr, if that is a terminal.
+/// Asset cache that reports large files and meshes on stderr, if that is a terminal.
 pub struct LoadReporter {
     pub assets: Arc<Assets>,
     enabled: Arc<AtomicBool>,

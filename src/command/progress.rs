@@ -8,7 +8,7 @@ use zerkalo_render::session::Report;
 /// Seconds of rendering before the first output.
 const QUIET_SECONDS: f64 = 0.25;
 /// Seconds of rendering before the first line of a log. Each further interval is equal to the time
-/// so far.
+/// so far, up to [`LONGEST_INTERVAL_SECONDS`].
 const FIRST_LINE_SECONDS: f64 = 1.0;
 /// Longest interval between lines of a log.
 const LONGEST_INTERVAL_SECONDS: f64 = 60.0;

@@ -24,8 +24,7 @@ impl Division {
     /// whole film with all light groups, the second a whole film with merged light groups, the
     /// third a division into regions.
     ///
-    /// # Errors
-    /// Fails if the smallest regions do not fit, or if a checkpoint is requested or
+    /// # Errors Fails if the smallest regions do not fit, or if a checkpoint is requested or
     /// resumed and a film with all light groups does not fit.
     pub fn new(
         scene: &Scene,
@@ -33,13 +32,13 @@ impl Division {
         args: &RenderArgs,
         cap: u64,
     ) -> Result<Self, Failure> {
-        // The measured memory of the process then includes the scene.
+        // While `world` exists, the measured memory of the process includes the scene.
         let world = AnyWorld::compile(scene, options);
         let groups = world.info().groups.members.len();
         let merged = world.info().groups.merged_count();
         let (size, threads) = (scene.film.size, args.compute.threads());
         let (cap, limit) = usable(cap);
-        // `check` demands more memory than `divide` estimates.
+        // `check` may refuse a picture that `divide` accepts, because it demands more memory.
         let refused = |groups| check(size, groups, 0).is_err();
         let divided = |groups| match divide(size, groups, threads, cap) {
             Ok(whole) if whole.count == 1 && refused(groups) => {

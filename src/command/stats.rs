@@ -7,7 +7,7 @@ use std::time::Duration;
 use zerkalo_render::schedule::StoppedBy;
 use zerkalo_scene::process_memory::resident_memory;
 
-/// Returns the contents of the file. Scripts rely on the keys.
+/// Returns the contents of the `--stats` file. Scripts rely on the keys.
 ///
 /// `scene_hash` is the hash of the scene file and of the files that it names, `total` the time from
 /// the start of the program until the picture was written.

@@ -5,7 +5,7 @@ use crate::measure::{Measured, Measurement, Variant, median, spread};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// Point of an error curve.
+/// Point of an error curve, with one field for each column of CSV or key of JSON.
 #[derive(Serialize)]
 struct Point {
     samples: u64,

@@ -14,7 +14,7 @@ use zerkalo_render::film::Display;
 use zerkalo_render::image_file;
 use zerkalo_scene::disk::{self, check_writable};
 
-/// Experiments without `--only` and `--full`.
+/// Names of the experiments that run if neither `--only` nor `--full` is given.
 const SHORT: [&str; 3] = ["adaptivity", "precision", "threads"];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
