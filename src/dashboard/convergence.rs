@@ -24,9 +24,9 @@ pub struct Convergence {
 const MOST: usize = 400;
 
 impl Convergence {
-    /// Returns the render time in seconds at which the noise last fell to `levels` 8-bit levels,
+    /// Returns the seconds of tracing after which the noise last fell to `levels` 8-bit levels,
     /// interpolated between two reports by a power law. Returns `None` if the latest noise is above
-    /// `levels`, or if all stored noise is at or below it.
+    /// `levels`, or if no stored noise is above it.
     pub fn seconds_at(&self, levels: f64) -> Option<f64> {
         // Only the last fall to `levels` counts, because switching on a light raises the noise
         // again.

@@ -6,7 +6,7 @@ use zerkalo_terminal::event::{Code, Key};
 /// Largest length of the text in characters. It suffices for a path and keeps editing fast.
 const MOST: usize = 400;
 
-/// Editor of a line of text. It also holds the reason why the text was refused.
+/// Editor of a line of text.
 #[derive(Clone, Debug, Default)]
 pub struct Editor {
     pub input: Input,

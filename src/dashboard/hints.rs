@@ -1,10 +1,10 @@
-//! Hint line, derived from the command table.
+//! Key hints in the last row of the screen, selected from the command table.
 
 use crate::dashboard::update::commands::{COMMANDS, Hint, HintLine};
 use crate::dashboard::{KeyContext, Model, Overlay};
 
-/// Returns the state that selects the hints. Returns `None` while an exported image covers the hint
-/// line.
+/// Returns the state of `model` that selects the hints. Returns `None` while an exported image
+/// covers the hint line.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Pick(_) | Overlay::NoiseTargets(_) | Overlay::Question(_)) => HintLine::List,

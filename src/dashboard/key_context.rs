@@ -5,8 +5,8 @@ use std::iter::successors;
 /// Panel or mode in which a key runs a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum KeyContext {
-    /// Any panel or mode that has no command of its own for the key. Overlays and text editors do
-    /// not use this context.
+    /// Any panel or mode that has no command of its own for the key. Overlays do not use this
+    /// context.
     Anywhere,
     /// The picture has the focus, in its default mode.
     Picture,

@@ -25,7 +25,7 @@ pub enum Message {
     Watched(Box<WatchReport>),
     /// Result of [`Effect::Pin`]: the picture and its mean number of samples per pixel.
     Pinned(Arc<LinearImage>, f64),
-    /// Result of [`Effect::Save`]: the path of the written file, or the error.
+    /// Result of [`Effect::Save`]: the scene, and the path of the written file or the error.
     Saved(Arc<Scene>, Result<PathBuf, SaveError>),
     /// Result of [`Effect::Load`].
     Loaded(Box<Result<Arc<Scene>, SceneErrors>>),
@@ -34,7 +34,7 @@ pub enum Message {
     OrphanedEdits(OrphanedEdits),
     /// Warning that is shown until the next key.
     Warning(String),
-    /// Written image or checkpoint, or the reason of the failure.
+    /// Written image or checkpoint, or the reason why it could not be written.
     Exported(Result<Exported, String>),
     /// Progress of [`Effect::ExportSized`], 0..=1; `None` at its end.
     ExportProgress(Option<f64>),
@@ -42,9 +42,9 @@ pub enum Message {
     ViewerImage(PathBuf, Result<Arc<ViewerImage>, String>),
     /// Fraction of the viewed image that the terminal has received, 0..=1.
     ImageSent(f64),
-    /// Value of [`Model::connection_rate`](crate::dashboard::model::Model::connection_rate).
+    /// Measured or fixed rate of output in bytes per second; `None` for a local terminal.
     ConnectionRate(Option<f64>),
-    /// Expiry of [`Model::next_timeout`](crate::dashboard::model::Model::next_timeout).
+    /// The time at which the notice disappears has been reached.
     Tick,
 }
 
@@ -87,8 +87,8 @@ impl Format {
     }
 }
 
-/// Contents of the picture's panel: a channel of the live render, or a comparison with a pinned
-/// picture, which the user has stored earlier.
+/// Contents of the picture's panel: a channel of the live render, or a comparison with the pinned
+/// picture, an earlier one that the user has stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DisplayChannel {
     /// Rendered picture.
@@ -135,13 +135,13 @@ impl DisplayChannel {
 /// only the last one is executed, except for saves and exports.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
-    /// Render this scene. Samples are kept if only lighting has changed.
+    /// Render this scene. Samples that are valid for it are kept.
     Show(Arc<Scene>),
     /// Use this display transform to measure noise and to write images.
     Display(Display),
     /// Render until the first of these stop criteria is reached.
     Stop(Stop),
-    /// Put into later snapshots the data that the view requests.
+    /// Set the size of the pictures in later snapshots, and the pixel whose values they have.
     View(View),
     /// Discard all samples and restart rendering.
     Restart,
@@ -173,10 +173,10 @@ pub enum Effect {
     /// Cancel the render of [`Effect::ExportSized`]. No image is written then, unless the write has
     /// begun.
     CancelExport,
-    /// Write the scene to the recovery file, which the next start offers after a crash. `None`
+    /// Write the scene to the recovery file. After a crash, the next start offers its edits. `None`
     /// removes the file.
     Autosave(Option<Arc<Scene>>),
-    /// Make the offered edits of a crashed run unsaved edits of the scene.
+    /// Take over the recovery file of a crashed run, whose edits the user has accepted.
     Recover,
     /// Discard the offered edits of a crashed run.
     Discard,

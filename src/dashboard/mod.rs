@@ -4,7 +4,7 @@
 //! clock, files or terminal. `view` draws a model into a buffer of cells. `run` is the event loop,
 //! which executes the effects.
 
-// Public for tests of the program only; many names of fields and variants need no comment.
+// The dashboard is public only for tests. Many names of fields and variants need no comment.
 #![allow(missing_docs)]
 
 pub mod convergence;

@@ -150,7 +150,7 @@ pub struct Model {
     pub stop: Stop,
     /// `true` if the user has paused the render.
     pub paused: bool,
-    /// Bytes per second of the connection to a remote terminal; `None` for a local terminal.
+    /// Measured or fixed rate of output in bytes per second; `None` for a local terminal.
     pub connection_rate: Option<f64>,
     pub notice: Option<Notice>,
     pub export: Option<RunningExport>,
@@ -158,7 +158,7 @@ pub struct Model {
     /// `true` until the first key; the hint line has hints for beginners then.
     pub first_time: bool,
     pub drag: Option<Drag>,
-    /// Time of the last edit, if the next edit may still be merged with it.
+    /// Time of the last edit, if the next edit may still join its undo step.
     pub last_edit: Option<Duration>,
     /// `true` if the program quits as soon as the pending save has succeeded.
     pub quit_when_saved: bool,
@@ -166,7 +166,7 @@ pub struct Model {
     pub orphaned_edits: Option<OrphanedEdits>,
     /// Scene of the last autosave; `None` if there were no unsaved edits at that time.
     pub autosaved: Option<Arc<Scene>>,
-    /// Columns and rows, in half cells, of the pictures that were last requested.
+    /// Last requested size of pictures: columns and rows of half cells.
     pub raster: Option<[usize; 2]>,
     /// Counter that increases whenever the picture's cells may have become outdated.
     pub picture_version: u64,
@@ -188,8 +188,8 @@ pub(super) fn first_line(errors: &SceneErrors) -> String {
 
 impl Model {
     /// Creates the model of a dashboard that renders `scene`, which is an error if the scene file
-    /// at `path` cannot be read. Without a path, `name` is shown as the file name. The event loop
-    /// later sets the screen size and the colours.
+    /// at `path` cannot be read. Without a path, `name` is shown as the file name. The caller sets
+    /// the screen size and the colours later.
     pub fn new(
         path: Option<PathBuf>,
         name: &str,

@@ -1,5 +1,4 @@
-//! List of noise targets, noise values at which rendering can stop, with the time to reach each of
-//! them.
+//! List of noise targets (noise at which rendering can stop), each with the time to reach it.
 
 use crate::dashboard::Convergence;
 use crate::dashboard::text::{duration, durations};
@@ -18,8 +17,8 @@ pub const APPEARANCES: [&str; QUALITIES.len()] = [
 /// Note below the list.
 pub const ABOUT: &str = "Halving the noise takes two to four times as long. Enter: stop there.";
 
-/// Describes the render time that is needed to reach the noise target `QUALITIES[at]`, such as `3–5
-/// s more`. The text has no time for a target that the first report had already reached.
+/// Describes the time to reach the noise target `QUALITIES[at]`, such as `3–5 s more` or `reached
+/// after 2 s`. For a target that the first report had reached, the text is `reached`.
 pub fn cost(report: Option<&Report>, convergence: &Convergence, at: usize) -> String {
     let Some(report) = report else { return "not known yet".to_string() };
     if report.noise.is_some_and(|noise| noise.rmse.levels <= QUALITIES[at]) {

@@ -42,7 +42,7 @@ pub struct ViewedImage {
     pub sent: f64,
 }
 
-/// List from which the user picks an entry, found by fuzzy search: commands, kinds or values.
+/// List of commands, kinds or values, from which the user picks one. Fuzzy search filters it.
 #[derive(Clone, Debug)]
 pub struct Pick {
     pub title: String,
@@ -60,9 +60,9 @@ pub struct Pick {
 #[derive(Clone, Debug)]
 pub struct PickEntry {
     pub name: String,
-    /// Description of a word, or chapter of a command.
+    /// Description of a kind or value, or chapter of a command; may be empty.
     pub note: String,
-    /// Keys of a command.
+    /// Keys of a command; empty for other entries.
     pub keys: String,
 }
 
@@ -107,5 +107,5 @@ pub struct Question {
     pub at: ListCursor,
 }
 
-/// Letter, text and effect of an answer.
+/// Answer to a question: its letter, its text, and the function that carries it out.
 pub(super) type Answer = (char, &'static str, fn(&mut UpdateContext<'_>));

@@ -13,9 +13,9 @@ pub struct OverlayLayout {
     pub frame: Rect,
     /// Row of the text input.
     pub input: Rect,
-    /// Area of a list, a form's fields or a text.
+    /// Area of a list or of a form's fields.
     pub list: Rect,
-    /// Area of text below the list: help, a question, or the reason why an input was refused.
+    /// Area of help, of the text of a question, or of the reason why an input was refused.
     pub help: Rect,
 }
 

@@ -191,8 +191,8 @@ pub fn walked<T>(lines: &[ListLine<T>], cursor: usize, steps: isize) -> usize {
 
 /// Returns the index of the first visible line in a list of `len` lines, of which `rows` are
 /// visible. It is the index closest to the present one, `scroll`, at which the line `cursor` is
-/// visible, and also the line above it if `rows` is greater than 2. Without `cursor`, any line may
-/// be the first.
+/// visible, and also the line above it if `rows` is greater than 2. Without `cursor`, only the end
+/// of the list limits the index.
 pub fn scrolled(scroll: usize, cursor: Option<usize>, len: usize, rows: usize) -> usize {
     let following = |cursor: usize| {
         let lowest = (cursor + 1).saturating_sub(rows);

@@ -24,7 +24,7 @@ pub struct EffectRunner {
     /// Renderer of the scene, or reader of watched films.
     pub session: Session,
     exporter: Exporter,
-    /// Abilities of a dashboard with a scene; `None` in `zerkalo watch`.
+    /// Scene file and resized export of a dashboard with a scene; `None` in `zerkalo watch`.
     editing: Option<Editing>,
     /// Receiver that is disconnected as soon as the last requested export has ended.
     exporting: Option<Receiver<()>>,
@@ -156,7 +156,7 @@ impl EffectRunner {
         });
     }
 
-    /// Calls `write` with the present picture in the session's thread.
+    /// Calls `write` with the present picture, in the session's thread.
     fn export<F>(&mut self, write: F)
     where
         F: FnOnce(&Exporter, Option<Picture>) -> Result<Exported, String> + Send + 'static,

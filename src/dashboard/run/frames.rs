@@ -23,7 +23,7 @@ pub struct FramePipeline {
     view: View,
     pub diff: FrameDiff,
     pub flow: FlowControl,
-    /// Send queue of the SSH connection in the kernel.
+    /// Send queue of the SSH connection in the kernel; `None` if there is none.
     queue: Option<TcpSendQueue>,
     /// Known capabilities, to which late replies add.
     pub terminal: Capabilities,
@@ -104,7 +104,7 @@ impl FramePipeline {
         self.give_up();
     }
 
-    /// Begins the upload of the image that the viewer of `model` shows, and gives up any other.
+    /// Begins the upload of the image that the viewer shows, and gives up the upload of any other.
     pub fn follow(&mut self, model: &Model) {
         let image = match &model.overlay {
             Some(Overlay::ViewerImage(viewed)) => viewed.image.as_ref(),
@@ -165,8 +165,8 @@ impl FramePipeline {
         }
     }
 
-    /// Returns the time at which [`FramePipeline::draw`] must be called next; `None` until the next
-    /// event.
+    /// Returns the time at which [`FramePipeline::draw`] must be called next; `None` if not before
+    /// the next event.
     pub fn due(&self, now: Duration, request: FrameRequest) -> Option<Duration> {
         let pending = self.diff.pending;
         let text = request.changed || pending.text || !self.removal.is_empty();
@@ -204,7 +204,7 @@ impl FramePipeline {
             if upload.open {
                 return self.slice(now, whole);
             }
-            // The viewed image covers the picture, or is about to.
+            // No picture cells are sent while the viewed image covers them or is about to.
             budget.picture &= !upload.follows(true);
         }
         if request.changed {

@@ -13,8 +13,8 @@ use zerkalo_terminal::{HUNG_UP, SignalEvent, SignalQueue, Signals, TimedEvent, T
 /// Grace period after a terminating signal.
 pub const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Longest time from a terminating signal to the end of the dashboard, so much shorter than the
-/// grace period that the program can report where unsaved edits are kept.
+/// Longest time from a terminating signal to the end of the dashboard. In the rest of the grace
+/// period the program reports where unsaved edits are kept.
 pub const ENDED_WITHIN: Duration = Duration::from_secs(4);
 
 /// Time for which the terminal's size must stay unchanged before its last change takes effect.

@@ -14,8 +14,8 @@ struct Awaiting {
     scene: u64,
 }
 
-/// Recorder of input latencies. It always has the events that await a response, because the event
-/// loop sends a frame at once if it responds to an event. It stores latencies only on request.
+/// Recorder of input latencies. It always knows the events that await a response: the event loop
+/// sends a frame at once if it responds to one. It stores latencies only on request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,

@@ -199,6 +199,6 @@ fn end(
 /// Longest wait for the first report on watched files.
 const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
 
-/// Initial stop criterion: half a quantisation step of an 8-bit image file.
+/// Initial stop criterion: a noise of half a level.
 const DEFAULT_STOP: Stop =
     Stop { spp: None, noise_levels: Some(0.5), rmse_linear: None, seconds: None };

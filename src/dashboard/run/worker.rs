@@ -5,7 +5,7 @@ use std::io;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// Handle of a thread that may wait for a disk or the renderer without end.
+/// Handle of a thread that may wait indefinitely for a disk or the renderer.
 pub struct Worker<T> {
     thread: JoinHandle<T>,
     /// Receiver that is disconnected at the end of the thread.
@@ -23,7 +23,8 @@ impl<T: Send + 'static> Worker<T> {
     }
 
     /// Waits for the end of the thread, at most for `patience`, without limit for `Duration::MAX`.
-    /// Returns the result of its function; `None` if it has not ended. Propagates its panic.
+    /// Returns the result of the thread, or `None` if it has not ended. Propagates a panic of the
+    /// thread.
     pub fn join_within(self, patience: Duration) -> Option<T> {
         if self.ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
             return None;

@@ -1,4 +1,4 @@
-//! Commands that adjust a light, the mirror or the lens by a key, and report the new values.
+//! Commands that adjust a light, the mirror or the lens by a key, and show the new values.
 
 use crate::dashboard::UpdateContext;
 use crate::dashboard::update::Coalesce;
@@ -9,7 +9,7 @@ use zerkalo_scene::edit::{self, Edit, EditError, SceneSettings, Target, bounds};
 use zerkalo_scene::value::{number, round_significant};
 
 impl UpdateContext<'_> {
-    /// Records an edit and reports the new values of the edited part.
+    /// Records an edit and shows the new values of the edited part in a notice.
     fn adjust(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.target.clone());
         self.commit(edit, coalesce);

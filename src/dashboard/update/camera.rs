@@ -21,8 +21,9 @@ const DOLLY: f64 = 0.9;
 const ZOOM: f64 = 0.95;
 
 impl UpdateContext<'_> {
-    /// Replaces the camera by the result of `f` for the camera and its distance from the pivot. All
-    /// camera moves have the same label, so that different moves can join into one undo step.
+    /// Replaces the camera by the result of `f`, whose arguments are the camera and its distance
+    /// from the pivot. All camera moves have the same label, so that different moves can join into
+    /// one undo step.
     pub(super) fn set_camera(&mut self, coalesce: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
         let camera = f(&scene.camera, pivot_distance(scene));
@@ -30,7 +31,7 @@ impl UpdateContext<'_> {
             return;
         }
         let next = Scene { camera, ..Scene::clone(scene) };
-        // Camera moves keep a valid camera valid.
+        // The scene needs no validation: camera moves keep a valid camera valid.
         let edit =
             Edit { scene: next, target: Target::Camera, label: "camera".to_string(), note: None };
         self.commit(Ok::<_, EditError>(edit), coalesce);
@@ -109,7 +110,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Orbits the camera by a drag in half cells: by 180 degrees across the picture.
+    /// Orbits the camera by a drag in half cells. The width of the picture means 180 degrees.
     pub(super) fn orbit_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(180.0);
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -117,7 +118,8 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Rotates the camera about the eye by a drag in half cells: by 90 degrees across the picture.
+    /// Rotates the camera about the eye by a drag in half cells. The width of the picture means 90
+    /// degrees.
     pub(super) fn look_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(90.0);
         self.set_camera(Coalesce::Gesture, |camera, _| {
@@ -140,8 +142,8 @@ impl UpdateContext<'_> {
         scene.camera.half_size(scene.film.size.map(f64::from))[0]
     }
 
-    /// Returns the amount for a drag by one half cell if a drag across the whole picture has the
-    /// amount `across`. Returns 0 if there is no room for a picture.
+    /// Returns the change by a drag of one half cell. `across` is the change by a drag across the
+    /// width of the picture. Returns 0 if there is no room for a picture.
     pub(super) fn per_half_cell(&self, across: f64) -> f64 {
         self.model.layout().map_or(0.0, |layout| across / layout.raster[0] as f64)
     }

@@ -267,7 +267,8 @@ impl Command {
     }
 
     /// Returns the keys with their contexts, such as `Left in the picture`. `key` formats the name
-    /// of one key. `watching` omits keys without effect in `zerkalo watch` and keys of overlays.
+    /// of one key. If `watching` is `true`, omits keys without effect in `zerkalo watch` and keys
+    /// of overlays.
     pub fn formatted_keys(&self, watching: bool, key: impl Fn(&str) -> String) -> String {
         let listed = |context| !watching || matches!(context, Anywhere | Outline | Probing);
         let in_context = |(context, names): &(KeyContext, &str)| {

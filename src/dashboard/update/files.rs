@@ -1,4 +1,4 @@
-//! Commands on undo, saving, reloading and quitting, and results of saves, loads and exports.
+//! Undo, saving, reloading and quitting, and the results of saves, loads and exports.
 
 use crate::dashboard::model::{Tone, first_line};
 use crate::dashboard::{Answer, Effect, Exported, UpdateContext, short_name};

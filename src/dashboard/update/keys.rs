@@ -38,7 +38,7 @@ impl UpdateContext<'_> {
         self.model.first_time = false;
         self.model.notice.take_if(|notice| notice.until.is_none());
         if let Some(Overlay::ViewerImage(_)) = self.model.overlay {
-            // Of the keys of overlays, those with Ctrl suspend or quit the program.
+            // Ctrl-Z and Ctrl-C suspend and quit the program. All other keys close the viewer.
             match lookup(KeyContext::Overlay, key).filter(|_| key.ctrl) {
                 Some(command) => self.run(command),
                 None => self.close_viewer(),

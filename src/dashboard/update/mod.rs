@@ -31,8 +31,8 @@ use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Edit, EditError, Target};
 use zerkalo_scene::value::sanitized;
 
-/// Updates the model with a message and returns the effects. `now` is the time since any fixed
-/// origin.
+/// Updates the model with a message and returns the effects. `now` is the time since an arbitrary
+/// fixed moment.
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
     let mut context = UpdateContext { model, now, effects: Vec::new(), follow: false, typed: None };
     context.model.notice.take_if(|notice| notice.until.is_some_and(|until| until <= now));
@@ -46,9 +46,9 @@ pub(super) struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
-    /// `true` if lists are scrolled until their cursors are visible.
+    /// `true` if lists are to be scrolled so that their cursors are visible.
     follow: bool,
-    /// Character of the key that ran the current command.
+    /// Character of the key that ran the current command; `None` if the key types none.
     typed: Option<char>,
 }
 

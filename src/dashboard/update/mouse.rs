@@ -13,7 +13,7 @@ use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 /// Number of lines that a list scrolls per tick of the wheel.
 const WHEEL_LINES: i32 = 3;
 
-/// Returns `true` if the mouse is in `area`; `None` is the area of a hidden panel.
+/// Returns `true` if the mouse is in `area`, and `false` for `None`, the area of a hidden panel.
 fn is_in(mouse: Mouse, area: impl Into<Option<Rect>>) -> bool {
     area.into().is_some_and(|area| area.contains((mouse.column, mouse.row).into()))
 }
@@ -82,7 +82,7 @@ impl UpdateContext<'_> {
     /// Selects the part of the scene on the clicked line. If the outline has the focus and the part
     /// is selected already, opens the inspector.
     fn press_in_outline(&mut self, rows: Rect, mouse: Mouse) {
-        // The change of focus below may change the layout.
+        // The line is looked up first, because a change of focus may change the layout.
         let lines = outline(self.scene());
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
         let subject = line.and_then(OutlineLine::entry).map(|entry| entry.subject.clone());
@@ -96,8 +96,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens the clicked property if the cursor is on it already and the list had the focus,
-    /// otherwise moves the cursor there.
+    /// Opens the clicked property if the cursor is on it already and the list had the focus
+    /// (`focused`), otherwise moves the cursor there.
     fn press_in_fields(&mut self, rows: Rect, focused: bool, mouse: Mouse) {
         let FieldList { cursor, scroll, editor, .. } = self.model.field_list();
         let (cursor, line) = (*cursor, line_at(rows, *scroll, mouse));
@@ -131,7 +131,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Moves the camera, the selection or the probe by the mouse's movement, as the mode demands.
+    /// Moves the camera, the selection or the probe, depending on the mode, as the mouse has moved.
     fn dragged(&mut self, mouse: Mouse) {
         let Some(drag) = &mut self.model.drag else { return };
         let [column, row] = drag.last;
@@ -168,7 +168,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Returns `true` in the modes in which all edits with the same label form one undo step.
+    /// Returns `true` if the mode moves or rotates the selection. All edits with the same label in
+    /// such a mode form one undo step.
     pub(super) fn moves_or_rotates(&self) -> bool {
         matches!(self.model.mode, Mode::Move | Mode::Rotate)
     }

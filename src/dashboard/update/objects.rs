@@ -5,9 +5,9 @@ use crate::dashboard::update::{Coalesce, Direction};
 use glam::{DVec2, DVec3};
 use zerkalo_scene::edit::{self, bounds, step_length};
 
-/// Largest factor by which a drag in the ground plane is stretched in depth. The sine of the angle
-/// between view direction and ground is the factor by which depth appears shortened. The stretch is
-/// its inverse: 4 at 14.5 degrees, and unbounded at grazing angles.
+/// Largest factor by which a drag in the ground plane is stretched in depth. The stretch
+/// compensates foreshortening: it is 1 / sin of the angle between view direction and ground, which
+/// is 4 at 14.5 degrees.
 const MOST_STRETCH: f64 = 4.0;
 
 /// Returns the coordinate axis in the ground plane, positive or negative, nearest to `v`.
@@ -21,7 +21,7 @@ impl UpdateContext<'_> {
     fn ground_axes(&self) -> [DVec3; 2] {
         let [right, _, _] = self.scene().camera.frame();
         let right = nearest_axis(right);
-        // View direction of an upright observer.
+        // Horizontal direction in which an upright observer looks whose right is `right`.
         [right, DVec3::Y.cross(right)]
     }
 

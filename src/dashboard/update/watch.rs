@@ -34,7 +34,7 @@ impl UpdateContext<'_> {
         let chosen = chosen.map(key);
         let same = report.shards.iter().position(|row| Some(key(row)) == chosen);
         let mut at = before.map_or_else(ListCursor::default, |table| table.at);
-        // The first row is the most urgent.
+        // The first row needs the user's attention most, so a cursor there does not move.
         at.index = if at.index == 0 { 0 } else { same.unwrap_or(at.index) };
         self.model.watch = Some(WatchTable { report, at });
     }

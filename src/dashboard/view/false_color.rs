@@ -70,7 +70,7 @@ pub fn difference(part: f64) -> [u8; 3] {
 
 /// Returns the colour of the object with number `id`. Consecutive numbers have distant hues.
 pub fn object_color(id: u32) -> [u8; 3] {
-    // The hue advances by the golden section, so that none is repeated.
+    // The hue advances by the golden section, so that no hue is repeated.
     let hue = (f64::from(id) * 0.618_033_988_749_895).fract();
     let color = colorous::SINEBOW.eval_continuous(hue);
     [color.r, color.g, color.b]

@@ -20,7 +20,7 @@ pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &m
     let mut row = painter.edge(area, 0);
     for (text, loud) in chips(model).iter().rev() {
         let style = if *loud { theme.warn() } else { theme.dim() };
-        // The name has at least 12 columns.
+        // At least 12 columns remain for the file name.
         row.put_right(&format!(" {text} "), 13, style);
         row.put_right("─", 12, theme.border(focused));
     }

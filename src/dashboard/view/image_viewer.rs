@@ -9,9 +9,9 @@ use ratatui::style::{Color, Style};
 use zerkalo_terminal::cells::picture_cells;
 use zerkalo_terminal::image::{Protocol, ViewerImage};
 
-/// Draws the viewed image in half blocks and returns these cells and their area. The uploaded image
-/// later replaces them. Returns `None` if the image is still being read, or placeholder characters
-/// show it.
+/// Draws the viewed image in half blocks until it is uploaded, and returns these cells and their
+/// area. Returns `None` if the image is still being read, or if placeholder characters of kitty's
+/// protocol show the uploaded image.
 pub fn draw(model: &Model, viewed: &ViewedImage, painter: &mut Painter) -> Option<(Buffer, Rect)> {
     let theme = painter.theme;
     let [width, height] = model.screen;

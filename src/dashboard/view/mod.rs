@@ -32,7 +32,7 @@ use zerkalo_terminal::cells::{Colors, picture_cells};
 #[derive(Debug, Default)]
 pub struct View {
     imager: PictureView,
-    /// Version from which `picture` was made; `None` before the first.
+    /// Version for which `picture` was made; `None` before the first picture.
     made_for: Option<Version>,
     picture: Buffer,
     /// Rectangle in which the picture was last drawn.
@@ -41,7 +41,7 @@ pub struct View {
     pub uncovered: Vec<bool>,
 }
 
-/// Version of the picture, columns and rows of half cells, and set of colours.
+/// Key of the cache: picture version, columns and rows of half cells, and set of colours.
 type Version = (u64, [usize; 2], Colors);
 
 impl View {
@@ -84,7 +84,7 @@ impl View {
         }
         status::draw(model, layout.status, painter);
         status::hints_line(model, layout.hints, painter);
-        // An open form replaces the panels.
+        // An open form replaces outline, inspector and plot.
         let mut cursor = None;
         if model.watch.is_some() {
             watch::draw(model, &layout, painter);

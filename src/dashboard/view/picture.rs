@@ -28,7 +28,7 @@ struct PinnedCache {
 }
 
 /// Returns `true` if the picture changes rarely or only by user input: if the render rests, films
-/// are watched, or a stored picture is visible.
+/// are watched, or the pinned picture or an exported image is visible.
 pub fn is_settled(model: &Model) -> bool {
     if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
@@ -70,7 +70,7 @@ impl PictureView {
     }
 
     /// Returns a raster of one value for each tile of the film, in false colour on a logarithmic
-    /// scale. `values` are row by row.
+    /// scale. `values` has the tiles row by row.
     fn tiles<T: Copy + Into<f64>>(
         &mut self,
         model: &Model,
@@ -153,8 +153,8 @@ fn beauty(model: &Model, snapshot: &Snapshot, size: [usize; 2]) -> Option<Raster
     Some(resized(live, size))
 }
 
-/// Returns a raster of the first hits in the colours `color`, and [`NO_HIT`] for rays without a
-/// hit.
+/// Returns a raster of the first hits in the colours that `color` returns. Rays without a hit have
+/// the colour [`NO_HIT`].
 fn hit_colors(
     snapshot: &Snapshot,
     size: [usize; 2],

@@ -8,7 +8,7 @@ use ratatui::style::{Color, Modifier, Style};
 use zerkalo_render::film::quantised_8;
 use zerkalo_scene::edit::Target;
 
-/// Width of the box with its border.
+/// Width of the box in columns, border included.
 const WIDTH: u16 = 36;
 
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {

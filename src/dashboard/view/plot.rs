@@ -43,8 +43,8 @@ impl Axis {
     }
 }
 
-/// Formats the value of a tick, such as `0.5` or `20`, without the error of a product with a
-/// negative power of ten.
+/// Formats the value of a tick, such as `0.5` or `20`, without the rounding error of negative
+/// powers of ten.
 fn label(value: f64) -> String {
     number(round_significant(value, 3))
 }
@@ -104,12 +104,12 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
         .render(plot, painter.buffer);
 }
 
-/// Returns a line between two points. A canvas supports colours, but no other style.
+/// Returns a line between two points. Of `style` it has only the colour.
 fn line([(x1, y1), (x2, y2)]: [(f64, f64); 2], style: Style) -> Line {
     Line { x1, y1, x2, y2, color: style.fg.unwrap_or(Color::Reset) }
 }
 
-/// Returns the dashes between two points, which cover the share `covered` of the line.
+/// Returns the dashes between two points, which cover the fraction `covered` of the line.
 fn dashes([a, b]: [(f64, f64); 2], covered: f64, style: Style) -> impl Iterator<Item = Line> {
     let at = move |part: f64| (a.0 + (b.0 - a.0) * part, a.1 + (b.1 - a.1) * part);
     (0..DASHES).map(move |i| {

@@ -1,4 +1,4 @@
-//! Exports of image files: the current picture, or a render at a size of the user's choice.
+//! Exports: the current picture, a checkpoint, or a render at a size of the user's choice.
 
 pub mod image_upload;
 pub mod image_viewer;
@@ -30,7 +30,7 @@ pub struct Exporter {
     /// Scene file as last read or written; `None` for watched films, whose metadata name their
     /// scene file.
     pub file: Option<SharedFile>,
-    /// Kind of random numbers, for the metadata.
+    /// Kind of random numbers that the metadata name.
     pub sampler: SamplerKind,
 }
 
@@ -83,7 +83,7 @@ impl Exporter {
     }
 
     /// Returns the beginning of file names, such as `room` in `room-2.png`: the name of the scene
-    /// file without its extension. In a process without a scene file, it is called `source`.
+    /// file without its extension. `source` is the path of the scene file of watched films.
     fn stem(&self, source: &str) -> String {
         let file = self.file.as_ref().and_then(SharedFile::get);
         let path = match &file {

@@ -192,8 +192,8 @@ impl Autosave {
         }
     }
 
-    /// Adopts the offered edits. `path` is the path of an unreadable scene file; if it is given,
-    /// returns a scene file with the recovered text.
+    /// Makes the recovery file with the offered edits that of this run. `path` is the path of an
+    /// unreadable scene file; if it is given, returns a scene file with the recovered text.
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let orphan = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());

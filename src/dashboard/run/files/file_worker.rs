@@ -11,7 +11,7 @@ use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFil
 
 /// Interval between checks for changes by other programs.
 pub const CHECK_INTERVAL: Duration = Duration::from_secs(1);
-/// Longest time that a save waits for the update of the recovery file.
+/// Longest time for which a save waits until the recovery file is up to date.
 const PREPARED_WITHIN: Duration = Duration::from_secs(2);
 
 pub enum Job {

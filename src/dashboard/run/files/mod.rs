@@ -29,7 +29,7 @@ const SAVED_WITHIN: Duration = Duration::from_secs(2);
 /// [`SAVED_WITHIN`] together are shorter than the grace period after a terminating signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
-/// Handle of the two threads.
+/// Handle of the threads that access the scene file and the recovery file.
 pub struct Files {
     jobs: Sender<Job>,
     autosaves: Sender<AutosaveJob>,
@@ -279,8 +279,8 @@ mod tests {
         assert_eq!(fs::read_to_string(&path).unwrap(), STARTER);
     }
 
-    /// Writes a scene file to `folder`. Returns two values: its path, and a scene that differs from
-    /// the one in the file.
+    /// Writes a scene file to `folder`. Returns its path, and a scene that differs from its
+    /// contents.
     fn edited(folder: &Path) -> (PathBuf, Arc<Scene>) {
         let path = folder.join("a.toml");
         fs::write(&path, STARTER).unwrap();

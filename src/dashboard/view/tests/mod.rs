@@ -14,8 +14,7 @@ use crate::dashboard::view::View;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 
-/// Returns two values: the screen of `model`, and the position of its text cursor. The position is
-/// `None` if the cursor is hidden.
+/// Returns the screen of `model`, and the position of its text cursor: `None` if it is hidden.
 fn drawn(model: &Model) -> (Buffer, Option<Position>) {
     let [width, height] = model.screen;
     let mut buffer = Buffer::empty(Rect { x: 0, y: 0, width, height });

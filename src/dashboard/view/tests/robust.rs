@@ -40,7 +40,7 @@ fn every_state_draws_at_threshold_sizes() {
             }
         }
     };
-    // In two threads: no other test draws so long.
+    // Two threads share the work, because this is the longest test of drawing.
     let (left, right) = STATES.split_at(STATES.len() / 2);
     std::thread::scope(|scope| {
         scope.spawn(|| draw(left));

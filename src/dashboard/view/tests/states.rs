@@ -30,7 +30,7 @@ fn press(model: &mut Model, keys: &str) {
 }
 
 /// Creates the model of a dashboard of `screen` columns and rows that has rendered 212 samples per
-/// pixel of the built-in scene.
+/// pixel of `mirror-room.toml`.
 pub fn tracing(screen: [u16; 2]) -> Model {
     let path = Some("scenes/mirror-room.toml".into());
     let stop = Stop { noise_levels: Some(0.5), ..Stop::default() };
@@ -169,8 +169,7 @@ fn watched(
     WatchedShards { shards: shards.to_string(), path, state, samples, total: Some(total), age }
 }
 
-/// Returns a report on a render in nine shards (parts of the render). Some are refused, missing or
-/// late.
+/// Returns a report on a render in nine shards, of which some are refused, missing or late.
 fn watched_plan() -> WatchReport {
     let reason = "cannot use parts/job-6.zk: it ends in the middle of the part TILE: it was not \
                   copied as a whole; copy it again, or use an older one";

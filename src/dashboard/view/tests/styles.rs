@@ -1,5 +1,4 @@
-//! Tests of colours and text attributes, which the golden files do not contain (they hold only the
-//! text of the screens).
+//! Tests of colours and text attributes. The golden files contain only the text of the screens.
 
 use crate::dashboard::model::Colors;
 use crate::dashboard::view::tests::states::{STATES, tracing};
