@@ -97,7 +97,7 @@ pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     }
 }
 
-/// Returns the reason why the terminal with `environment` cannot show the dashboard.
+/// Returns the reason why the terminal cannot show the dashboard; `None` if it can.
 pub fn obstacle(environment: &Environment) -> Option<&'static str> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         return Some("the dashboard needs a terminal at stdin and stdout");

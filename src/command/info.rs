@@ -33,7 +33,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
 }
 
-/// Returns the entries to print for a plan.
+/// Returns the description of a plan, in the form of a file's metadata.
 fn of_plan(plan: &Plan) -> FileMetadata {
     let settings = &plan.settings;
     let base = match settings.base_plan {

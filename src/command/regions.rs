@@ -24,8 +24,9 @@ impl Division {
     /// whole film with all light groups, the second a whole film with merged light groups, the
     /// third a division into regions.
     ///
-    /// # Errors Fails if the smallest regions do not fit, or if a checkpoint is requested or
-    /// resumed and a film with all light groups does not fit.
+    /// # Errors
+    /// Fails if the smallest regions do not fit, or if a checkpoint is requested or resumed and a
+    /// film with all light groups does not fit.
     pub fn new(
         scene: &Scene,
         options: &world::Options,

@@ -5,7 +5,7 @@ use crate::measure::{Measured, Measurement, Variant, median, spread};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// Point of an error curve, with one field for each column of CSV or key of JSON.
+/// Point of an error curve. Its fields are columns of the CSV file and keys of the JSON file.
 #[derive(Serialize)]
 struct Point {
     samples: u64,
