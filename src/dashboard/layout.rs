@@ -176,7 +176,7 @@ mod tests {
 
     /// Checks that the picture fills the width or the height of its panel, and that each cell of
     /// the picture shows a film pixel. The picture must have the film's aspect ratio, except for
-    /// rounding to whole half cells (a half cell is the upper or lower half of a cell).
+    /// rounding to whole half cells.
     #[test]
     fn picture_keeps_aspect_ratio_of_film() {
         for film in [[640, 480], [480, 640], [1920, 800], [1, 1], [8192, 1], [1, 8192]] {

@@ -64,7 +64,7 @@ impl Dashboard {
         }
         while !self.quit {
             let wait = self.draw();
-            // A snapshot is taken only when the terminal can receive another frame.
+            // A snapshot is received only when the terminal can take another frame.
             let (snapshots, wants_snapshot) = match self.wants_snapshot() {
                 None => (&silence, None),
                 Some(Duration::ZERO) => (&snapshots, None),

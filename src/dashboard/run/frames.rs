@@ -16,7 +16,7 @@ use zerkalo_terminal::{Capabilities, Tty, copied};
 /// Start and end of a synchronised update, which the terminal displays as a whole.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 
-/// Upper bound of the number of bytes of an acknowledgement request, 14 inside tmux.
+/// Upper bound of the length of an acknowledgement request, which has 14 bytes inside tmux.
 const ACK_REQUEST_BYTES: usize = 16;
 
 pub struct FramePipeline {
@@ -25,7 +25,7 @@ pub struct FramePipeline {
     pub flow: FlowControl,
     /// Send queue of the SSH connection in the kernel; `None` if there is none.
     queue: Option<TcpSendQueue>,
-    /// Known capabilities, to which late replies add.
+    /// Known capabilities of the terminal. Late replies add to them.
     pub terminal: Capabilities,
     /// Thread that writes frames. Each of its results must be reported to
     /// [`FramePipeline::record_written`].

@@ -24,7 +24,7 @@ const SETTLED: Duration = Duration::from_millis(90);
 const LONGEST: Duration = Duration::from_millis(400);
 /// Longest wait for the write of the recovery file before the program is suspended.
 const SECURED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait for a stop signal to stop the process. After it, the program resumes.
+/// Longest wait for a stop signal to stop the process. If it still runs then, the program resumes.
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
 /// Terminal, and the receivers of its events.

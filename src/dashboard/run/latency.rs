@@ -22,7 +22,7 @@ pub struct LatencyRecorder {
     awaiting: Vec<Awaiting>,
     /// Events to which the frame that is being written responds.
     in_flight: Vec<Awaiting>,
-    /// CSV table of the events to which a frame has responded; `None` if none is requested.
+    /// CSV table of the events to which a frame has responded; `None` if no table is requested.
     table: Option<String>,
 }
 

@@ -60,7 +60,7 @@ pub struct TerminalSetup {
     /// Set of colours; `None` to use the detected one.
     pub colors: Option<Colors>,
     pub environment: Environment,
-    /// Fixed rate of output in bytes per second; `None` adapts it to the connection.
+    /// Fixed rate of output in bytes per second; `None` to adapt it to the connection.
     pub bandwidth: Option<f64>,
 }
 
@@ -181,7 +181,7 @@ fn end(
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
         dashboard.await_answers();
     }
-    // The remaining writes may take a while.
+    // The terminal is restored first, because the remaining writes may take a while.
     drop(screen);
     let kept = dashboard.effects.finish(deadline);
     let mut ended = Ended { signalled: result?, exported: Vec::new(), kept };

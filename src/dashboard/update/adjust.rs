@@ -81,8 +81,8 @@ impl UpdateContext<'_> {
         self.adjust(edit, Coalesce::Repeat);
     }
 
-    /// Focuses on the pixel probe, else on the middle of the selection, else on the centre of the
-    /// picture.
+    /// Focuses the lens on the pixel probe, else on the middle of the selection, else on the centre
+    /// of the picture.
     pub(super) fn focus(&mut self) {
         let [width, height] = self.scene().film.size.map(|n| n as usize);
         let selection = bounds(self.scene(), &self.model.selection);
@@ -93,7 +93,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Focuses on the object that is visible at the centre of film pixel `pixel`.
+    /// Focuses the lens on the object that is visible at the centre of film pixel `pixel`.
     pub(super) fn focus_on_pixel(&mut self, pixel: [usize; 2]) {
         match first_hit(self.scene(), pixel) {
             Some((_, point)) => self.focus_on(point.to_array()),

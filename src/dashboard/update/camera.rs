@@ -110,7 +110,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Orbits the camera by a drag in half cells. The width of the picture means 180 degrees.
+    /// Orbits the camera for a drag in half cells, by 180 degrees for the width of the picture.
     pub(super) fn orbit_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(180.0);
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -118,8 +118,8 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Rotates the camera about the eye by a drag in half cells. The width of the picture means 90
-    /// degrees.
+    /// Rotates the camera about the eye for a drag in half cells, by 90 degrees for the width of
+    /// the picture.
     pub(super) fn look_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(90.0);
         self.set_camera(Coalesce::Gesture, |camera, _| {
@@ -127,7 +127,7 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Pans the camera by a drag in half cells. Points at the depth of the pivot stay under the
+    /// Pans the camera for a drag in half cells. Points at the depth of the pivot stay under the
     /// mouse.
     pub(super) fn pan_by_hand(&mut self, right: f64, down: f64) {
         let share = self.per_half_cell(2.0 * self.half_width());

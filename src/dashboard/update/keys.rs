@@ -4,7 +4,7 @@ use crate::dashboard::update::commands::{Command, lookup};
 use crate::dashboard::{Editor, FieldList, KeyContext, Model, Overlay, UpdateContext};
 use zerkalo_terminal::event::{Code, Key};
 
-/// Returns the character that `key` types.
+/// Returns the character that `key` types; `None` for all other keys and with Ctrl or Alt.
 fn typed(key: Key) -> Option<char> {
     match key {
         Key { code: Code::Char(c), ctrl: false, alt: false, .. } => Some(c),

@@ -68,8 +68,8 @@ enum Coalesce {
 }
 
 impl Coalesce {
-    /// Returns `true` if the edit joins. `age` is the time since the previous edit; `None` unless
-    /// its rule was [`Self::Repeat`].
+    /// Returns `true` if the edit joins the previous step. `age` is the time since the previous
+    /// edit; `None` unless its rule was [`Self::Repeat`].
     fn joins(self, age: Option<Duration>) -> bool {
         match self {
             Self::Single => false,

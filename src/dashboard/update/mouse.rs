@@ -19,7 +19,7 @@ fn is_in(mouse: Mouse, area: impl Into<Option<Rect>>) -> bool {
 }
 
 /// Returns the index of the line under the mouse in the list at `rows`, whose first visible line
-/// has the index `scroll`. Returns `None` outside of `rows`.
+/// has the index `scroll`. Returns `None` outside `rows`.
 fn line_at(rows: Rect, scroll: usize, mouse: Mouse) -> Option<usize> {
     is_in(mouse, rows).then(|| usize::from(mouse.row - rows.y) + scroll)
 }

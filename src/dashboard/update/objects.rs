@@ -21,7 +21,7 @@ impl UpdateContext<'_> {
     fn ground_axes(&self) -> [DVec3; 2] {
         let [right, _, _] = self.scene().camera.frame();
         let right = nearest_axis(right);
-        // Horizontal direction in which an upright observer looks whose right is `right`.
+        // The cross product points away from an upright observer.
         [right, DVec3::Y.cross(right)]
     }
 

@@ -120,7 +120,7 @@ fn expected(property: &Property) -> String {
     }
 }
 
-/// Draws a heading with a line up to the last column but one.
+/// Draws a heading, and a horizontal line from there to the column before the last.
 fn heading(mut to: Row, title: &str) {
     let theme = to.theme;
     to.put(" ", theme.heading()).put(title, theme.heading()).put(" ", theme.heading());

@@ -15,7 +15,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     painter.panel(area, "outline", active);
     let inner = area.inner(BORDER);
     let lines = outline(model.scene());
-    // In this channel, each object has a mark in its colour in the picture.
+    // If the picture shows object ids as colours, each line has a mark in its object's colour.
     let with_ids = model.channel == DisplayChannel::Objects;
     let (scroll, border) = (model.outline_scroll, theme.border(active));
     for VisibleLine { row, index } in painter.window(inner, scroll, lines.len(), border) {

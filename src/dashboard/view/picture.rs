@@ -14,7 +14,7 @@ use zerkalo_world::FirstHit;
 /// Converter of the model to rasters, images of half cells.
 #[derive(Debug, Default)]
 pub struct PictureView {
-    /// Legend of the last raster.
+    /// Legend of the last raster; `None` if it needs none.
     pub legend: Option<Legend>,
     pinned: Option<PinnedCache>,
 }

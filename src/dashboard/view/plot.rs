@@ -104,7 +104,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
         .render(plot, painter.buffer);
 }
 
-/// Returns a line between two points. Of `style` it has only the colour.
+/// Returns a line between two points. Only the colour of `style` is used.
 fn line([(x1, y1), (x2, y2)]: [(f64, f64); 2], style: Style) -> Line {
     Line { x1, y1, x2, y2, color: style.fg.unwrap_or(Color::Reset) }
 }

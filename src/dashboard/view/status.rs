@@ -15,7 +15,7 @@ use zerkalo_render::session::{Report, State};
 
 /// Part of the status line, shown or omitted as a whole.
 struct Part {
-    /// Order in which parts are omitted, the largest number first.
+    /// Rank for omission: parts with the largest number are omitted first.
     expendable: u8,
     text: Vec<(String, Style)>,
 }

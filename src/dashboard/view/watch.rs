@@ -142,8 +142,8 @@ fn samples(shard: &WatchedShards) -> String {
     }
 }
 
-/// Returns state and progress of the render, and the numbers of files that are late, missing or
-/// refused.
+/// Returns parts of the status line: state and progress of the render, and the numbers of files
+/// that are late, missing or refused.
 pub fn summary(report: &WatchReport, theme: &Theme) -> Vec<(String, Style)> {
     let mut texts = Vec::new();
     match report.complete {

@@ -13,7 +13,7 @@ use zerkalo_terminal::cells::{Raster, level, linear};
 use zerkalo_terminal::image::{ImageViewport, Protocol, ViewerImage};
 use zerkalo_terminal::{Capabilities, cell_px};
 
-/// Longest time in which an image may be sent. For slow connections the image is downscaled.
+/// Longest time for sending an image, which is downscaled if the connection is slow.
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
 
 /// Returns the viewport of the image viewer on a screen of these columns and rows.

@@ -83,7 +83,7 @@ impl Exporter {
     }
 
     /// Returns the beginning of file names, such as `room` in `room-2.png`: the name of the scene
-    /// file without its extension. `source` is the path of the scene file of watched films.
+    /// file without its extension. For watched films, `source` is the path of their scene file.
     fn stem(&self, source: &str) -> String {
         let file = self.file.as_ref().and_then(SharedFile::get);
         let path = match &file {

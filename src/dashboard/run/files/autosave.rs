@@ -40,7 +40,7 @@ struct Pending {
 }
 
 impl Autosave {
-    /// Creates the autosave of the scene at `path`, or called `name` without a path.
+    /// Creates the autosave of the scene file at `path`, or of a scene `name` without a file.
     pub fn new(path: Option<&Path>, name: &str, state: Option<PathBuf>) -> Self {
         Self {
             recovery: Recovery::new(path, name, state.as_deref()),
@@ -192,8 +192,8 @@ impl Autosave {
         }
     }
 
-    /// Makes the recovery file with the offered edits that of this run. `path` is the path of an
-    /// unreadable scene file; if it is given, returns a scene file with the recovered text.
+    /// Takes over the recovery file with the offered edits. `path` is the path of an unreadable
+    /// scene file; if it is given, returns a scene file with the recovered text.
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let orphan = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());

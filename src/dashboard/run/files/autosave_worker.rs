@@ -32,7 +32,7 @@ pub struct AutosaveWorker {
     /// Path of the scene file at the start.
     pub path: Option<PathBuf>,
     pub shared: SharedFile,
-    /// Jobs of the thread that reads and writes the scene file.
+    /// Sender of jobs to the thread that reads and writes the scene file.
     pub jobs: Sender<Job>,
     pub results: Sender<Message>,
 }

@@ -83,7 +83,6 @@ fn select(model: &mut Model, object: &str) {
     model.selection = found.unwrap_or_else(|| panic!("{object} in the built-in scene"));
 }
 
-/// Selects the first object of the scene.
 fn select_first(model: &mut Model) {
     let name = Target::Object(0).label(model.scene());
     select(model, &name);
