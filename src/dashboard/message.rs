@@ -44,7 +44,7 @@ pub enum Message {
     ImageSent(f64),
     /// Measured or fixed rate of output in bytes per second; `None` for a local terminal.
     ConnectionRate(Option<f64>),
-    /// The time at which the notice disappears has been reached.
+    /// Time has passed, so that the notice disappears.
     Tick,
 }
 

@@ -155,7 +155,7 @@ pub struct Model {
     pub notice: Option<Notice>,
     pub export: Option<RunningExport>,
     pub last_export: Option<PathBuf>,
-    /// `true` until the first key; the hint line has hints for beginners then.
+    /// `true` until the first user input. Until then, the hint line has hints for beginners.
     pub first_time: bool,
     pub drag: Option<Drag>,
     /// Time of the last edit, if the next edit may still join its undo step.

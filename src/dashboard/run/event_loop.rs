@@ -32,7 +32,7 @@ pub struct Dashboard {
     /// Counter that increases when another picture replaces the present one, but not when more
     /// samples refine it.
     pub image_epoch: u64,
-    /// Changes of the terminal's size that have not taken effect yet.
+    /// Debounce of changes of the terminal's size that have not taken effect yet.
     pub resizing: ResizeDebounce,
     /// Time at which the model last received the connection's rate or upload progress.
     pub status_sent_at: Duration,

@@ -10,7 +10,7 @@ use std::thread;
 use std::time::Duration;
 use zerkalo_terminal::{HUNG_UP, SignalEvent, SignalQueue, Signals, TimedEvent, Tty, size};
 
-/// Grace period after a terminating signal.
+/// Grace period after a terminating signal, at whose end the program exits in any case.
 pub const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Longest time from a terminating signal to the end of the dashboard. In the rest of the grace

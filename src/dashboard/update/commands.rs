@@ -9,7 +9,7 @@ use zerkalo_terminal::event::Key;
 /// State that selects the hints in the hint line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum HintLine {
-    /// No key has been pressed yet.
+    /// There was no user input yet.
     First,
     /// No overlay is open, and keys are looked up in this context.
     In(KeyContext),
