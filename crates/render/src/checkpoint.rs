@@ -3,8 +3,8 @@
 //!
 //! A checkpoint has three chunks in addition to those of a film file. `SCEN` has the scene for
 //! which the samples were traced, and the other inputs of samples. `SCHD` has the state of the
-//! schedule. `TIME` has the seconds of rendering so far (f64). The seconds are no part of `SCHD`,
-//! because equal renders take different times.
+//! schedule. `TIME` has the seconds of rendering so far (f64). It is a chunk of its own, because
+//! equal renders take different times, but have equal `SCHD` chunks.
 
 use crate::export::{Provenance, film_header};
 use crate::file_error::FileError;
@@ -26,7 +26,8 @@ const CLOCK: Tag = *b"TIME";
 /// Version of this program. Another version may trace different samples.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
-/// Inputs of a film's samples in addition to those in the film's header (size, seed, precision).
+/// Inputs on which a film's samples depend, except those in the film's header (size, seed,
+/// precision).
 ///
 /// Encoding: hash of the contents of meshes and images (u64, 0 for none), then three texts, each
 /// preceded by its length (u32): the program's version, the sampler's name, the scene.
@@ -60,8 +61,8 @@ impl SampleInputs {
         (SCENE, out)
     }
 
-    /// Returns `true` if samples with these inputs are valid for `scene`. Sources that have light
-    /// groups of their own may differ in colour, intensity and switch.
+    /// Returns `true` if samples with these inputs are valid for `scene`, as
+    /// [`LightGroups::can_reuse`](world::LightGroups::can_reuse) decides.
     pub fn fit(&self, scene: &Scene) -> bool {
         let resolver = scene.resolver.clone();
         let Ok(compiled) = Scene::parse_in(&self.scene, "checkpoint", resolver) else {
@@ -85,7 +86,7 @@ impl SampleInputs {
     }
 }
 
-/// Encodes a render as a checkpoint on the threads of `pool`. `report` is the latest report on it.
+/// Encodes a render as a checkpoint on the threads of `pool`. `report` is its latest report.
 pub(super) fn encode(
     state: &RenderState,
     schedule: &Schedule,
@@ -132,9 +133,9 @@ impl Checkpoint {
         SampleSettings { seed: self.header.film.seed, kind }
     }
 
-    /// Compiles the checkpoint's scene, restores the render, and relights it as `scene`. The noise
-    /// estimates are those of the checkpoint's light weights and display transform. Fails if the
-    /// samples are not valid for `scene` and `options`.
+    /// Compiles the checkpoint's scene, restores the render, and changes its lights to those of
+    /// `scene`. The restored noise estimates are for the light weights and display transform of the
+    /// checkpoint. Fails if the samples are not valid for `scene` and `options`.
     pub(super) fn resume(
         self,
         scene: &Arc<Scene>,

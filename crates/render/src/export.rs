@@ -9,7 +9,7 @@ use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_scene::Scene;
 use zerkalo_scene::value::Fnv1a64;
 
-/// Origin of a picture: the metadata that its [`RenderState`] does not have.
+/// Origin of a picture: the part of its metadata that is not in its [`RenderState`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Provenance {
     /// Path of the scene file as the user gave it.
@@ -69,7 +69,7 @@ pub fn metadata(
     entries.map(|(key, value)| (key.to_string(), value)).collect()
 }
 
-/// Formats the metadata entry `SETTINGS`.
+/// Formats the value of the metadata entry `SETTINGS`.
 pub fn settings_text(sampler: &str, precision: &str, adaptive: bool, display: &Display) -> String {
     let allocation = if adaptive { "adaptive" } else { "uniform" };
     let display = display_text(display);
@@ -82,7 +82,7 @@ fn display_text(display: &Display) -> String {
 
 /// Key of the metadata entry with sampler, precision, sample allocation and display transform.
 const SETTINGS: &str = "Settings";
-/// Text before the display transform in the entry [`SETTINGS`].
+/// Text that precedes the display transform in the value of [`SETTINGS`].
 const DISPLAY: &str = ", exposure ";
 
 /// Returns the metadata entries about samples and noise.

@@ -9,7 +9,7 @@ use std::sync::atomic::Ordering;
 use zerkalo_kernel::lanes::SimdFloat;
 use zerkalo_world::{Counts, TileTracer, World};
 
-/// Number of adjacent tiles that share packets in stages with few pixels for each tile.
+/// Number of adjacent tiles that share packets in stages that add only a few pixels to each tile.
 const STRIP_TILES: usize = 8;
 
 /// Largest step \[pixels\] of a stage in which one tile has enough pixels to fill packets.
@@ -69,9 +69,9 @@ struct StripPixel {
     position: (u32, u32),
 }
 
-/// Returns the pixels of `tiles` that a stage adds: those of the lattice with the step `step` in x
-/// and y that are not in the lattice with the step `previous_step` (0: none). `tiles` has the first
-/// pixel of each tile.
+/// Returns the pixels of `tiles` that a stage adds: those whose x and y are multiples of `step`,
+/// but not both multiples of `previous_step` (0: none are left out). `tiles` has the first pixel of
+/// each tile.
 fn pixels_to_add(
     tiles: &[([usize; 2], &mut Tile)],
     (previous_step, step): (usize, usize),
@@ -131,9 +131,9 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
                 tiles[p.tile].1.add_group(0, p.pixel, group, sums);
             });
         });
-        // The rays of shared packets are divided in proportion to the pixels of each tile, because
-        // the cost must not depend on the packet width. Only packets of a single tile report random
-        // choices.
+        // The rays of packets with pixels of several tiles are divided among the tiles in
+        // proportion to their pixels, so that ray counts do not depend on the packet width. Random
+        // choices are recorded only for packets of a single tile.
         let packet_counts = tracer.counts();
         if let [counts] = counts {
             counts.rays += packet_counts.rays;

@@ -61,8 +61,8 @@ pub fn refused(size: [u32; 2], groups: usize) -> String {
     )
 }
 
-/// Memory \[bytes\] of a tile of a region in addition to its sums: its entry in the schedule, its
-/// estimates, jobs and reports.
+/// Memory \[bytes\] of a tile while its region is rendered, in addition to its sums: its entry in
+/// the schedule, its estimates, jobs and reports.
 const REGION_TILE_BYTES: u64 = 1024;
 /// Memory \[bytes\] for each tile of the whole picture, while regions are rendered: its estimate,
 /// and its entry in the list for percentiles.
@@ -88,8 +88,8 @@ pub struct Regions {
 }
 
 /// Divides a picture into the fewest regions such that this process uses at most `cap` bytes for
-/// the program, the compiled scene and one region at a time. Fails with the smallest possible `cap`
-/// if not even one row of tiles fits, or if the process has already used more.
+/// the program, the compiled scene and one region at a time. If not even one row of tiles fits, or
+/// the process has already used more than `cap`, returns the smallest possible `cap` as the error.
 pub fn divide(size: [u32; 2], groups: usize, threads: usize, cap: u64) -> Result<Regions, u64> {
     divide_from(resident_memory().unwrap_or(UNKNOWN_RESIDENT), size, groups, threads, cap)
 }

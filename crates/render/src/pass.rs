@@ -59,8 +59,8 @@ pub fn run_typed<L: SimdFloat>(
         let error = if wave.estimate { estimator.tile(tile) } else { None };
         Some(JobReport { rays: counts.rays, glossy: counts.glossy, error })
     };
-    // The calling thread traces a single job, if the pool has a single thread: no switch of
-    // threads.
+    // If the pool has one thread and the wave one job, the calling thread traces the job. This
+    // avoids a switch of threads.
     if pool.current_num_threads() == 1 && slots.len() == 1 {
         slots.into_iter().zip(&wave.jobs).map(trace).collect()
     } else {
@@ -75,7 +75,7 @@ pub(super) struct TileRenderer<'a, L: SimdFloat> {
     scales: &'a [f64],
     /// Largest radiance of one sample that the film can hold, for each light group: 2^49 steps.
     limits: [L; MAX_GROUPS],
-    /// Pixels of a tile that is entirely inside the picture, see [`pixels_of`].
+    /// Result of [`pixels_of`] for a tile that is entirely inside the picture.
     whole_tile: Vec<u8>,
 }
 
@@ -94,8 +94,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     }
 
     /// Traces the samples of `job` and adds them to `tile`, whose first pixel is at `origin`. A
-    /// packet holds `WIDTH` samples of one pixel if its first index is a multiple of `WIDTH` and at
-    /// least `WIDTH` samples remain; otherwise it holds fewer samples of each of several pixels.
+    /// packet holds `WIDTH` samples of one pixel if its first sample index is a multiple of `WIDTH`
+    /// and at least `WIDTH` samples remain. Otherwise it holds fewer samples of each of several
+    /// pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent == [TILE; 2] {
@@ -186,7 +187,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Replaces the samples that the film cannot hold. Calls `count(lane, fault)` for each fault.
+    /// Replaces the samples that the film cannot hold. Calls `count(lane, fault)` for each of them.
     /// Valid samples cost only a comparison.
     #[inline(always)]
     pub(super) fn replace_faults(
@@ -208,9 +209,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Implements [`Self::replace_faults`] for a packet with a fault. A light group in
-    /// which a channel is NaN or negative becomes black. A channel above the limit, even an
-    /// infinite one, is reduced to the limit.
+    /// Implements [`Self::replace_faults`] for a packet with a fault. A light group in which a
+    /// channel is NaN or negative becomes black. A channel above the limit, even an infinite one,
+    /// is reduced to the limit.
     #[cold]
     fn replace_found_faults(
         &self,

@@ -28,7 +28,7 @@ const FIRST_PIECE_SAMPLES: u64 = 1 << 18;
 const LONGEST_JOB: u32 = 16 * SAMPLE_ALIGNMENT;
 
 /// Callback that receives a report after each piece of work and before each row is written. An
-/// error that it returns ends the render.
+/// error from it ends the render.
 pub type Observer<'a> = &'a mut dyn FnMut(&Report) -> io::Result<()>;
 
 /// Render of a picture in regions.
@@ -159,8 +159,8 @@ impl RegionRender {
         Ok(())
     }
 
-    /// Returns the report on the finished regions and the region of `state`. Of this region,
-    /// `share` is done, after `seconds` seconds.
+    /// Returns the report on the finished regions and on the region of `state`. After `seconds`
+    /// seconds, the fraction `share` of this region is done.
     fn report_with(
         &self,
         state: &RenderState,

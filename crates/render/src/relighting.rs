@@ -14,8 +14,7 @@ pub struct Relighting {
 
 impl Relighting {
     /// Returns the light weights with which the film shows `scene`. Returns `None` if `scene` needs
-    /// new samples, because it differs in more than the colours, intensities and switches of
-    /// sources that have light groups of their own.
+    /// new samples, as [`LightGroups::can_reuse`] decides.
     pub fn weights(&self, scene: &Scene) -> Option<LightWeights> {
         let can_reuse =
             std::ptr::eq(scene, &*self.compiled) || self.groups.can_reuse(&self.compiled, scene);

@@ -18,12 +18,12 @@ use zerkalo_world::{self as world, AnyWorld, Precision};
 pub struct Options {
     pub world: world::Options,
     pub sampling: SampleSettings,
-    /// Display transform of the picture whose noise is estimated.
+    /// Display transform for which the noise of the picture is estimated.
     pub display: Display,
 }
 
 impl Options {
-    /// Creates options with separate light groups.
+    /// Creates options with which each light has a light group of its own, as far as possible.
     pub fn new(precision: Precision, sampling: SampleSettings, display: Display) -> Self {
         let world = world::Options { precision, ..world::Options::default() };
         Self { world, sampling, display }
@@ -45,7 +45,7 @@ pub struct RenderState {
 }
 
 impl RenderState {
-    /// Compiles `scene` and creates an empty film, in the memory of the film of `previous`. Returns
+    /// Compiles `scene` and creates an empty film, which reuses the memory of `previous`. Returns
     /// the first validation error, or an error if there is not enough memory.
     pub fn new(
         scene: &Arc<Scene>,
@@ -69,7 +69,7 @@ impl RenderState {
     }
 
     /// Compiles `scene`, which must be valid, and creates an empty film for the rows `rows` of the
-    /// picture, in the memory of the film of `previous`. The first row must be a multiple of
+    /// picture, which reuses the memory of `previous`. The first row must be a multiple of
     /// [`TILE`](crate::film::TILE). Fails if there is not enough memory.
     pub(super) fn compile(
         scene: Arc<Scene>,
@@ -113,8 +113,8 @@ impl RenderState {
         })
     }
 
-    /// Makes the film a picture of `scene` and returns `true`. Returns `false`, without a change,
-    /// if `scene` has faults or the samples are not valid for it.
+    /// Shows `scene` by a change of light weights and returns `true`. Returns `false`, without a
+    /// change, if `scene` has faults or needs new samples.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(weights) = self.lighting.weights(scene).filter(|_| scene.faults().is_empty())
         else {
@@ -163,8 +163,8 @@ impl RenderState {
         schedule
     }
 
-    /// Traces the jobs of the first pass, see `first_pass::run`. The film of a cancelled pass may
-    /// only be displayed; no further samples may be added to it.
+    /// Traces the jobs of the first pass, as `first_pass::run` does. The film of a cancelled pass
+    /// may only be displayed; no further samples may be added to it.
     pub fn trace_first_pass(
         &mut self,
         wave: &Wave,

@@ -21,14 +21,15 @@ pub struct Wave {
     pub replicate: usize,
     pub jobs: Vec<Job>,
     /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B set
-    /// it: the estimate needs equally many samples of both replicates, and B is traced after A.
+    /// it: an estimate needs equally many samples of both replicates, and B is traced after A.
     pub estimate: bool,
 }
 
 impl Wave {
-    /// Shortens each job to at most `longest` samples per pixel, at least [`SAMPLE_ALIGNMENT`]. It
-    /// ends at a multiple of this number, so that the packets of the rest are full. Keeps only the
-    /// first jobs: as many as `pixel_samples` samples over all pixels need, and at least one.
+    /// Shortens each job to at most `longest` samples per pixel; `longest` is at least
+    /// [`SAMPLE_ALIGNMENT`]. A shortened job ends at a multiple of [`SAMPLE_ALIGNMENT`], so that
+    /// the packets of the rest are full. Keeps only the first jobs: as many as hold `pixel_samples`
+    /// samples over all pixels, and at least one.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;

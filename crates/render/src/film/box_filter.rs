@@ -4,11 +4,11 @@
 /// Pixels of an image that one cell overlaps along one axis, fully or in part.
 pub(super) struct Coverage {
     pub first: usize,
-    /// Fractions, 0..=1, of the consecutive pixels from `first` on that the cell covers.
+    /// Fraction of each pixel that the cell covers, 0..=1, for consecutive pixels from `first` on.
     pub parts: Vec<f64>,
 }
 
-/// Divides a row of `pixels` pixels into `cells` equal cells. Returns the pixels of each cell.
+/// Divides a row of `pixels` pixels into `cells` equal cells. Returns the coverage of each cell.
 pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     let edge = |cell: usize| cell as f64 * pixels as f64 / cells as f64;
     let cover = |cell: usize| {

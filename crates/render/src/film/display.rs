@@ -10,8 +10,8 @@ pub enum Tone {
     #[default]
     Clip,
     /// The Khronos PBR Neutral tone mapper (Khronos specification of 2024). It subtracts at most
-    /// 0.04 from all channels, then compresses the colours whose largest channel is still above
-    /// 0.76. It keeps hues.
+    /// 0.04 from all channels. It then compresses the colours whose largest channel is still above
+    /// 0.76, and keeps their hues.
     Neutral,
 }
 
@@ -42,8 +42,8 @@ impl Display {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Returns a closure that rounds [`Display::levels`] to 8 bits. A lookup table and precomputed
-    /// constants make it several times faster.
+    /// Returns a closure that converts radiance to levels as [`Display::levels`] does, and rounds
+    /// them to 8 bits. A lookup table makes it several times faster.
     pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
         let (tone, factor, curve) = (self.tone, self.exposure_factor(), &*SRGB_TABLE);
         move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.level_8(c))

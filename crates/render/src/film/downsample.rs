@@ -8,8 +8,8 @@ use crate::film::store::Film;
 use crate::film::tile::Tile;
 use rayon::prelude::*;
 
-/// Film downsampled to a smaller image: the mean radiance of each cell in each light group. When
-/// light weights change, the film need not be read again.
+/// Film downsampled to a smaller image: the mean radiance of each cell in each light group. A
+/// change of light weights needs no access to the film.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Thumbnail {
     /// Number of cells in a row.
@@ -54,7 +54,7 @@ pub struct IncrementalDownsample {
     parts: Vec<TilePart>,
 }
 
-/// Geometry of a downsampling. `size` is the width and height of the film in pixels.
+/// Geometry of a downsampling: `cols` x `rows` cells over a film of `size` pixels.
 struct Layout {
     cols: usize,
     rows: usize,
@@ -78,11 +78,11 @@ struct Span {
 /// Contribution of a film tile to the cells that it overlaps.
 #[derive(Default)]
 struct TilePart {
-    /// Film's epoch, sample counts and lattice of the tile at the latest refresh. `None` if the
+    /// Epoch of the film, and counts and lattice of the tile, at the latest refresh. `None` if the
     /// tile had no samples.
     version: Option<(u64, [u32; 2], usize)>,
-    /// Values of each cell, `[row][column][area, group 0 red, ...]`: the area of the sampled pixels
-    /// inside the cell, then sums of each pixel's area times its mean. Empty without samples.
+    /// Sums for each cell, `[row][column][area, group 0 red, ...]`: the area of the sampled pixels
+    /// inside the cell, then the area of each pixel times its mean radiance. Empty without samples.
     sums: Vec<f64>,
 }
 
@@ -162,8 +162,8 @@ impl IncrementalDownsample {
 }
 
 impl Span {
-    /// Finds the cells that the tiles from pixel `start` overlap along an axis of `pixels` pixels.
-    /// `coverage` has the pixels of each cell along this axis.
+    /// Finds the cells that one column or row of tiles, which begins at pixel `start`, overlaps
+    /// along an axis of `pixels` pixels. `coverage` has the pixels of each cell along this axis.
     fn new(start: usize, pixels: usize, coverage: &[Coverage]) -> Self {
         let end = (start + TILE).min(pixels);
         let touched =
@@ -208,8 +208,7 @@ impl TilePart {
 }
 
 /// Adds every `step`-th pixel in row `y` of a tile to `line`, the values of one row of cells, laid
-/// out as in [`TilePart::sums`]. The caller multiplies `line` by the
-/// covered height.
+/// out as in [`TilePart::sums`]. The values lack the factor of the covered height.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {

@@ -11,8 +11,8 @@ pub struct LightWeights {
 }
 
 impl LightWeights {
-    /// Returns the factors, `[group][channel]`, that convert the integer sums of a film with
-    /// `scales` to sums of radiance under these weights.
+    /// Returns the factors, `[group][channel]`, that convert integer sums to sums of radiance under
+    /// these weights. `scales` are the scales of the film's light groups.
     pub fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
         assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
         self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()
@@ -49,7 +49,7 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns integer sum `i`, in the order `[group][channel]`, over `replicates`.
+    /// Returns integer sum `i` (see [`Self::values`] for the order) over `replicates`.
     #[inline(always)]
     pub fn value(&self, replicates: Replicates, i: usize) -> f64 {
         match replicates {

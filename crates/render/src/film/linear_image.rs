@@ -14,8 +14,8 @@ pub struct LinearImage {
 }
 
 impl LinearImage {
-    /// Creates the image of `film` under `weights`. Pixels without samples are filled by the rule
-    /// of [`Thumbnail::of_film`](crate::film::Thumbnail::of_film) for cells without samples.
+    /// Creates the image of `film` under `weights`. A pixel without samples gets the value of a
+    /// near pixel, as a cell does in [`Thumbnail::of_film`](crate::film::Thumbnail::of_film).
     pub fn of_film(film: &Film, weights: &LightWeights) -> Self {
         let (width, height) = (film.header.width, film.header.height);
         let per_unit = weights.radiance_per_step(&film.header.scales);

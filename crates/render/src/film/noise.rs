@@ -3,17 +3,17 @@
 //!
 //! The replicates A and B are independent, and equally distributed if their sample counts are
 //! equal. The half difference d = (A - B) / 2 then has the variance of the picture M = (A + B) / 2.
-//! In linear light the mean of d^2 is therefore the mean square error of the picture, unbiased for
-//! any sampler.
+//! For any sampler, the mean of d^2 is therefore an unbiased estimate of the picture's mean square
+//! error in linear light.
 //!
 //! The displayed error is level(M) - level(truth), where level is the display transform to 8-bit
-//! levels. Its square is estimated by the mean of (level(M) - level(M + d))^2 and (level(M) - level(M -
-//! d))^2, where M + d is A and M - d is B. These differences displace M by d, which is as large as
-//! the error of M. A curved or clipped tone curve therefore changes the estimate as much as the
-//! error. The hardest case of the tests is a dark pixel with 16 samples in each of A and B, only a
-//! few of which receive light. There the ratio of true to estimated RMSE is 1.13. Two simpler
-//! estimates are worse in this test. Half the displayed difference of A and B has the ratio 1.20; d
-//! times the slope of the curve at M has the ratio 1.52.
+//! levels. Its square is estimated by the mean of (level(M) - level(M + d))^2 and (level(M) -
+//! level(M - d))^2, where M + d is A and M - d is B. Both displace M by d, which is as large as the
+//! error of M. A curved or clipped tone curve therefore changes the estimate as much as the error.
+//! The hardest case of the tests is a dark pixel with 16 samples in each of A and B, only a few of
+//! which receive light. There the true RMSE is 1.13 times the estimate. Two simpler estimates are
+//! worse in this test: 1.20 times with half the displayed difference of A and B, 1.52 times with d
+//! times the slope of the curve at M.
 //!
 //! The estimate of a single pixel has one degree of freedom and is meaningless. The estimate of a
 //! tile has an uncertainty of about 7 % if its pixels are alike; that of a whole picture is far
@@ -41,7 +41,7 @@ use crate::film::light_weights::LightWeights;
 use crate::film::srgb_table::{SRGB_TABLE, SrgbTable};
 use crate::film::tile::Tile;
 
-/// Number for each measure of the error of a tile or picture.
+/// Pair of numbers, one for each of the two measures of error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ByMeasure {
     /// Number for the error of linear radiance.
@@ -51,7 +51,7 @@ pub struct ByMeasure {
 }
 
 impl ByMeasure {
-    /// Value of [`TileNoise::squares`] for tests: practically infinitely many effective pixels.
+    /// Value of [`TileNoise::squares`] for tests: that of an error spread over very many pixels.
     #[cfg(test)]
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
 
@@ -59,7 +59,7 @@ impl ByMeasure {
         *self = self.zip(other, |sum, value| sum + weight * value);
     }
 
-    /// Applies `f` to each measure of the error and the same measure of `other`.
+    /// Combines the numbers of `self` and `other` by `f`, separately for each measure.
     pub(crate) fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
         Self { linear: f(self.linear, other.linear), levels: f(self.levels, other.levels) }
     }
@@ -78,7 +78,7 @@ pub struct TileNoise {
     pub squares: ByMeasure,
     /// Number of pixels of the tile that are inside the picture.
     pub pixels: u32,
-    /// Number of samples per pixel in a replicate: the mean of A and B.
+    /// Mean of the numbers of samples per pixel in A and in B.
     pub samples: u32,
 }
 
@@ -214,7 +214,7 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Returns this estimate with the larger RMSE of the picture, linear and displayed, of the two.
+    /// Returns this estimate with each RMSE raised to that of `other` if that is larger.
     pub(crate) fn larger(self, other: Self) -> Self {
         Self { rmse: self.rmse.zip(other.rmse, f64::max), ..self }
     }

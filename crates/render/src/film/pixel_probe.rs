@@ -1,4 +1,4 @@
-//! Pixel probe of the dashboard.
+//! Pixel probe: what the dashboard shows of a single pixel.
 
 use crate::film::TILE;
 use crate::film::display::Display;

@@ -4,13 +4,14 @@
 use std::sync::LazyLock;
 use zerkalo_scene::value::srgb_from_linear;
 
-/// Base-2 logarithm of the number of entries per octave of linear light.
+/// Binary logarithm of the number of segments per octave (factor of 2) of linear light.
 const SEGMENTS_LOG2: u32 = 7;
-/// Exponent of the smallest octave of the table. The sRGB encoding is linear up to 0.0031308.
+/// First octave of the table, which begins at 2^-9. Smaller values are in the linear part of the
+/// sRGB encoding, which ends at 0.0031308.
 const FIRST_OCTAVE: i32 = -9;
 const SHIFT: u32 = 52 - SEGMENTS_LOG2;
 /// Number that is subtracted from the upper bits of a double to get its index in the table. Entry 0
-/// is the linear part of the encoding; entry 1 begins at 2^FIRST_OCTAVE.
+/// is the linear part of the encoding; entry 1 begins at 2^[`FIRST_OCTAVE`].
 const BASE: u64 = (((1023 + FIRST_OCTAVE) as u64) << SEGMENTS_LOG2) - 1;
 const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
 
@@ -48,7 +49,7 @@ impl SrgbTable {
         at_zero + slope * linear
     }
 
-    /// Rounds the exact encoding of linear light 0..=1 to 8 bits.
+    /// Encodes linear light 0..=1 as the nearest 8-bit level of the exact encoding.
     #[inline]
     pub fn level_8(&self, linear: f64) -> u8 {
         let above = self.level(linear) + 0.5;

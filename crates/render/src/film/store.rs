@@ -8,7 +8,7 @@ use crate::film::noise::{Estimator, Noise};
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::collections::TryReserveError;
 
-/// Size of a film in bytes from which all its tiles are allocated before the first sample.
+/// Least size, in bytes, of a film whose tiles are all allocated before the first sample.
 const RESERVED_FROM: u64 = 64 << 20;
 
 /// Properties of a film. Only films with equal properties can be added.
@@ -81,8 +81,8 @@ impl Film {
         Self::try_new(header, None).expect("memory for the tiles of a film")
     }
 
-    /// Creates a film without samples, in the memory of `previous`. A large film gets all its
-    /// memory here.
+    /// Creates a film without samples, which reuses the memory of `previous`. All memory of a large
+    /// film is allocated here.
     ///
     /// # Errors
     /// Fails if there is too little memory.
@@ -106,8 +106,8 @@ impl Film {
         Ok(film)
     }
 
-    /// Returns the memory of the sums of a film in bytes. Tiles at the edge of the picture count in
-    /// full.
+    /// Returns the bytes that the sums of a film take. A tile at the edge of the picture takes as
+    /// many as any other.
     pub fn memory_bytes(size: [u32; 2], groups: usize) -> u64 {
         let [columns, rows] = size.map(|n| u64::from(n).div_ceil(TILE as u64));
         columns * rows * (Tile::sums_len(groups) * size_of::<i64>()) as u64

@@ -1,4 +1,4 @@
-//! Films with known contents, contents of films, and random numbers, for the tests of all crates.
+//! Helpers for the tests of all crates: films with known contents, films as bytes, random numbers.
 
 use crate::film::file::FilmFileHeader;
 use crate::film::{Display, Film, Header, LightWeights, Replicates, TILE, Tile};

@@ -16,8 +16,8 @@ const CACHE_LINE: usize = 8;
 /// Integer sums of a pixel without samples.
 static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 
-/// Integer sums of 16 x 16 pixels of a film. A pixel has the number `y * 16 + x` in its tile.
-/// Pixels outside the picture stay zero.
+/// Integer sums of 16 x 16 pixels of a film. The pixel in column x and row y of the tile has the
+/// number `16 y + x`. Pixels outside the picture stay zero.
 ///
 /// All pixels have the same number of samples in a replicate, except during the first pass, which
 /// adds the first sample of replicate A to more and more pixels, see [`Tile::lattice_px`].
@@ -41,8 +41,8 @@ pub struct Tile {
     pub saturated_samples: u64,
     /// Number of samples with [`SampleFault::Invalid`].
     pub bad_samples: u64,
-    /// Integer sums, `[replicate][pixel][group][channel]`. Until the tile is first written, only the
-    /// memory is used.
+    /// Integer sums, `[replicate][pixel][group][channel]`. Until the tile is first written, the
+    /// numbers have no meaning; the vector only keeps memory.
     pub(super) sums: Vec<i64>,
     /// Bits of the pixels written since the film's last restart: bit `p % 64` of `[replicate][p /
     /// 64]` is for pixel p. Sums of other pixels count as zero, so that a restart does not access
@@ -78,8 +78,8 @@ impl Tile {
         Ok(())
     }
 
-    /// Clears the tile if it was written before the film's current epoch, `epoch`. Allocates its
-    /// memory if necessary.
+    /// Clears the tile, unless it was written in `epoch`, the current epoch of the film. Allocates
+    /// its memory if necessary.
     pub(super) fn clear_if_stale(&mut self, epoch: u64) {
         if self.epoch == epoch {
             return;
@@ -181,7 +181,7 @@ impl Tile {
     }
 
     /// Adds non-negative `values`, `[group][channel]`, to the sums of a pixel. A sum that would
-    /// exceed `i64::MAX` stays at it: the result is independent of the order of addition.
+    /// exceed `i64::MAX` becomes `i64::MAX`, so that the order of addition does not matter.
     #[inline(always)]
     pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
         for (group, values) in values.chunks_exact(3).enumerate() {
@@ -226,7 +226,7 @@ impl Tile {
     }
 }
 
-/// Returns `i64::MAX` if `sum`, the result of a wrapping addition, has overflowed, otherwise `sum`.
+/// Returns `sum`, the result of a wrapping addition, or `i64::MAX` if the addition overflowed.
 #[cold]
 fn saturated_sum(sum: i64) -> i64 {
     if sum < 0 { i64::MAX } else { sum }

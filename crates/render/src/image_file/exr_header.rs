@@ -1,9 +1,9 @@
-//! Sorting of the attributes of an OpenEXR header, so that equal pictures have equal files.
+//! Sorting of the attributes of an OpenEXR header, so that equal pictures have equal files. The
+//! crate `exr` takes their order from a hash map; it differs between runs.
 //!
-//! The order of the crate `exr` comes from a hash map and differs between runs. Source: *OpenEXR
-//! File Layout*. A header is a list of attributes that ends with a zero byte. An attribute consists
-//! of a name and a type (each ends with a zero byte), a size (i32, little-endian), and `size` bytes
-//! of data.
+//! Source: *OpenEXR File Layout*. A header is a list of attributes that ends with a zero byte. An
+//! attribute consists of a name and a type (each ends with a zero byte), a size (i32,
+//! little-endian), and `size` bytes of data.
 
 /// Number of bytes of an OpenEXR file before the first attribute: magic number and version.
 const PREAMBLE: usize = 8;

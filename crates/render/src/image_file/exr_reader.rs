@@ -22,8 +22,8 @@ pub(super) fn read_exr_meta(path: &Path) -> Result<MetaData> {
     MetaData::read_from_buffered(Tracking::new(BufReader::new(open_regular(path)?)), false)
 }
 
-/// Reads the channels `R G B` of an OpenEXR file, and `A.R ..` and `B.R ..` of the replicates if
-/// they exist.
+/// Reads the channels `R`, `G` and `B` of an OpenEXR file, and those of the replicates, `A.R` to
+/// `B.B`, if they exist.
 pub fn read_exr(path: &Path) -> std::result::Result<ReadPicture, String> {
     let meta = read_exr_meta(path).map_err(|e| e.to_string())?;
     let largest = meta.headers.iter().map(|h| h.layer_size.area()).max().unwrap_or(0);

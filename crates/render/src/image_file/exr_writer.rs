@@ -2,8 +2,8 @@
 //! replicates, light groups and sample count.
 //!
 //! `R G B` is the picture. `A.R ..` and `B.R ..` are the pictures of the replicates. `light_NAME.R
-//! ..` are the contributions of the light groups, whose sum is the picture. `count` is the number
-//! of samples of a pixel.
+//! ..` is the contribution of a light group; the sum of all contributions is the picture. `count`
+//! is the number of samples of a pixel.
 //!
 //! The file consists of tiles, so that programs can read a part of a large picture. The header is
 //! written again at the end, with sorted attributes and the final metadata.
@@ -43,12 +43,13 @@ pub(super) fn encode(
     })
 }
 
-/// Source of the values of a channel; the last field is the colour (0 red, 1 green, 2 blue).
+/// Source of a channel's values. The last field of a variant is the colour (0 red, 1 green, 2
+/// blue).
 #[derive(Clone, Copy)]
 enum Source {
-    /// Radiance of all light groups, averaged over replicates.
+    /// Radiance of all light groups together: the mean over the samples in these replicates.
     Mixed(Replicates, usize),
-    /// Radiance of one light group: its number, then the colour.
+    /// Radiance of the light group with this number.
     Group(usize, usize),
     /// Number of samples in both replicates.
     Count,
@@ -88,7 +89,7 @@ fn encode_to(
     Ok(replace_start(sink, &before?, &after?)?)
 }
 
-/// Returns the bytes of the file before its table of chunks.
+/// Returns the bytes of the file from its start to the end of the header, attributes sorted.
 fn header(
     picture: &FilmFileHeader,
     channels: &[(String, Source)],
@@ -102,7 +103,7 @@ fn header(
     }
 }
 
-/// Returns the header of the only part of the file.
+/// Returns the headers of the file's parts, of which there is only one.
 fn headers(
     picture: &FilmFileHeader,
     channels: &[(String, Source)],
@@ -160,8 +161,8 @@ fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
     channels
 }
 
-/// Returns a unique layer name for each light group, of ASCII letters, digits, `_` and `-`. Groups
-/// without a name have their number.
+/// Returns a unique layer name for each light group, of ASCII letters, digits, `_` and `-`. A group
+/// without a name is named by its number.
 fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
     let mut layers: Vec<String> = Vec::new();
@@ -178,8 +179,8 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     layers
 }
 
-/// Encodes the pixels of a row of tiles: appends the values of each of `channels`, `[row][column]`,
-/// to its list in `bytes`.
+/// Encodes the pixels of the rows `rows`: appends the values of each of `channels`,
+/// `[row][column]`, to the channel's list in `bytes`.
 fn encode_rows(
     picture: &FilmFileHeader,
     channels: &[(String, Source)],
@@ -212,8 +213,8 @@ fn encode_rows(
     Ok(())
 }
 
-/// Returns the mean over a pixel's samples of sum `i`, in the order `[group][channel]`; 0 without
-/// samples.
+/// Returns the mean over a pixel's samples of integer sum `i`, in radiance; 0 without samples. Sums
+/// are in the order `[group][channel]`.
 fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
     match sums.count(Replicates::Both) {
         0 => 0.0,

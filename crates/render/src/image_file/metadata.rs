@@ -11,8 +11,8 @@ use zerkalo_scene::disk::open_regular;
 /// Metadata values are padded to a multiple of this number of bytes.
 const PADDED: usize = 128;
 
-/// Pads a metadata value with spaces. Noise and sample counts that are known only at the end of a
-/// render overwrite placeholders of the same length.
+/// Pads a metadata value with spaces. At the end of a render, the final noise and sample counts
+/// overwrite the values of the same padded length that were written at its start.
 pub(super) fn padded(value: &str) -> String {
     let len = value.len().next_multiple_of(PADDED).max(PADDED);
     format!("{value}{}", " ".repeat(len - value.len()))
@@ -26,7 +26,7 @@ fn unpadded((key, value): (String, String)) -> (String, String) {
 /// Metadata of a picture file (PNG, OpenEXR) or film file.
 #[derive(Clone, Debug)]
 pub struct FileMetadata {
-    /// Name of the file's format: `PNG`, `OpenEXR`, `film`, or `plan` for a plan.
+    /// Name of the file's format: `PNG`, `OpenEXR`, `film` or `plan`.
     pub format: &'static str,
     /// Width and height of the picture in pixels.
     pub size: [usize; 2],

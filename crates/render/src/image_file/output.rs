@@ -23,9 +23,9 @@ pub trait Bands {
     /// Returns the film that holds row `y`. Encoders request all rows, in increasing order.
     fn film_with_row(&mut self, y: usize) -> io::Result<&Film>;
 
-    /// Returns the metadata after the last row; `None` if they are those of the header.
+    /// Returns the metadata as they are after the last row. `None` if they are those of the header.
     ///
-    /// A value may differ from the value in the header if both have at most 128 bytes.
+    /// A value may differ from that of the header only if both have at most 128 bytes.
     fn final_metadata(&self) -> Option<Vec<(String, String)>> {
         None
     }
@@ -55,7 +55,7 @@ pub struct ImageOutput {
     pub path: PathBuf,
     /// Index in [`FORMATS`].
     format: usize,
-    /// Decides if an existing file is replaced, both when the write begins and when it ends.
+    /// Decides if an existing file may be replaced; checked when the write begins and when it ends.
     pub existing: Existing,
 }
 
@@ -82,11 +82,12 @@ impl ImageOutput {
         Replacement::begin(&self.path, self.existing).map(drop)
     }
 
-    /// Writes the picture with its `header` row by row to a temporary file, which replaces an old
-    /// file when it is complete and stored on the disk. Only PNG files use `depth`.
+    /// Writes the picture with its `header` row by row to a temporary file. This file replaces an
+    /// old file when it is complete and stored on the disk. Only PNG files use `depth`.
     ///
     /// A key of the metadata has 1 to 79 printable ASCII characters without leading, trailing or
-    /// double spaces. It begins with an upper-case letter, because the keys of OpenEXR do not.
+    /// double spaces. It begins with an upper-case letter, because the keys that OpenEXR itself
+    /// defines begin with lower-case letters.
     pub fn write(
         &self,
         header: &FilmFileHeader,

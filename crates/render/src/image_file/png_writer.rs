@@ -77,7 +77,8 @@ fn start<W: Write>(
         Depth::Sixteen => BitDepth::Sixteen,
     });
     encoder.set_compression(Compression::Fast);
-    // For readers that ignore the sRGB chunk: the values that the PNG specification gives for sRGB.
+    // Readers that ignore the sRGB chunk use these values, which the PNG specification gives for
+    // sRGB.
     encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
     encoder.set_source_gamma(ScaledFloat::from_scaled(45_455));
     let xy = |x, y| (ScaledFloat::from_scaled(x), ScaledFloat::from_scaled(y));
@@ -88,7 +89,7 @@ fn start<W: Write>(
         blue: xy(15_000, 6_000),
     });
     for (key, value) in metadata {
-        // More programs read tEXt than iTXt, but it holds only Latin-1.
+        // More programs read tEXt than iTXt, but tEXt holds only Latin-1.
         if value.is_ascii() {
             encoder.add_text_chunk(key.clone(), padded(value))?;
         } else {

@@ -166,7 +166,7 @@ impl Plan {
         lines.setting("tiles", &format!("{count}, the number of tiles of the size"), |text| {
             number(text).filter(|n: &usize| *n == count)
         })?;
-        // The file may promise more tiles than it has lines.
+        // The file may state more tiles than it has lines.
         let mut tiles = Vec::with_capacity(count.min(lines.rest.len() / MIN_TILE_BYTES));
         for _ in 0..count {
             tiles.push(lines.tile()?);
@@ -202,7 +202,7 @@ impl<'a> Lines<'a> {
         Some(line)
     }
 
-    /// Reads the next line, which must have the setting `key`. `expected` describes valid values in
+    /// Reads the next line, which must be `key` and its value. `expected` describes valid values in
     /// error messages.
     fn setting<T>(
         &mut self,

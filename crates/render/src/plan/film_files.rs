@@ -1,5 +1,5 @@
-//! Film files that other processes write, and the sum of their films, for merging and watching. After
-//! a change all films are added again, which takes the memory of one film.
+//! Film files that other processes write, and the sum of their films, for merging and watching.
+//! After a change of a file, all films are added again, which takes the memory of one film only.
 
 use crate::checkpoint::seconds_of;
 use crate::film::Film;
@@ -35,7 +35,7 @@ pub struct FilmFiles {
 #[derive(Debug)]
 struct NamedPlan {
     path: PathBuf,
-    /// Part without shards, which is joined to the parts of the files.
+    /// Plan as a part without shards, so that it can be joined with the parts of the files.
     part: Part,
 }
 
@@ -43,15 +43,15 @@ struct NamedPlan {
 #[derive(Debug)]
 struct FilmFile {
     path: PathBuf,
-    /// Shard that a named plan expects in this file.
+    /// Number of the shard that this file should hold, if a named plan lists the file.
     shard: Option<u32>,
     /// Stamp of the file when it was last read. `None` for a missing file.
     stamp: Option<FileStamp>,
     contents: Contents,
     /// Samples, over all pixels, that the file contributes to the sum.
     samples: u64,
-    /// Samples of the file's shards when they are complete. `None` before the file is added, and
-    /// without a plan.
+    /// Number of samples of the file's shards when they are complete. `None` before the film is
+    /// added, and without a plan.
     total: Option<u64>,
 }
 
@@ -60,7 +60,7 @@ enum Contents {
     Missing,
     Refused(String),
     Part(Part),
-    /// Checkpoint without a plan, with its seconds of rendering.
+    /// Checkpoint without a plan. The number is its seconds of rendering.
     Checkpoint(f64),
 }
 
@@ -348,7 +348,7 @@ impl FilmFile {
         }
     }
 
-    /// Returns the number of the shard by which usable files are ordered. `None` for other files.
+    /// Returns the lowest number of a shard in a usable file. `None` for other files.
     fn first_shard(&self) -> Option<u32> {
         match &self.contents {
             Contents::Part(part) => Some(part.shards[0].number),
@@ -357,8 +357,8 @@ impl FilmFile {
         }
     }
 
-    /// Adds the film of this file to `sum`, or to an empty film with the header of this file if there
-    /// is no sum yet. Fails if its number of samples does not fit its shards.
+    /// Adds the film of this file to `sum`. The first film is added to an empty film with its
+    /// header. Fails if its number of samples does not fit its shards.
     fn add_to(&mut self, sum: &mut Option<SavedFilm>) -> Result<(), String> {
         let reader = FilmReader::open(&self.path).map_err(|error| error.to_string())?;
         let SavedFilm { film, .. } = match sum {

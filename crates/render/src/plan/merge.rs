@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Sum of the films of the parts of a plan.
 pub struct Merged {
     pub film: Film,
-    /// Header of the file with the lowest shard number, in which `part` replaces the file's part.
+    /// Header of the file with the lowest shard number, in which `part` replaces that of the file.
     pub header: FilmFileHeader,
     pub part: Part,
 }
@@ -81,9 +81,9 @@ pub(super) struct SourcePart<'a> {
     pub part: &'a mut Part,
 }
 
-/// Checks that the films of `parts` can be added, and returns their common plan. One film may be
-/// the merged film from which the common plan started; its part becomes a part of the common plan
-/// that holds only the shard [`BASE`].
+/// Checks that the films of `parts` can be added, and returns their common plan. One of the films
+/// may be the base of this plan, merged by an earlier plan. Its part is replaced by a part of the
+/// common plan that holds only the shard [`BASE`].
 ///
 /// # Errors
 /// Fails if there is no part, if the parts belong to different plans, if two of them hold the same
@@ -106,7 +106,7 @@ pub(super) fn join(parts: &mut [SourcePart]) -> Result<Arc<Plan>, String> {
     Ok(plan)
 }
 
-/// Finds the common plan of `parts` for [`join`], and converts the part of the plan's base.
+/// Finds the common plan of `parts` for [`join`], and replaces the part of the plan's base.
 fn common_plan(parts: &mut [SourcePart]) -> Result<Arc<Plan>, String> {
     let latest = parts.iter().map(|source| &source.part.plan).find(|latest| {
         let is_base = |plan: &Plan| latest.settings.base_plan == Some(plan.checksum());

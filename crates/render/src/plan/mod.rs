@@ -32,7 +32,7 @@ use zerkalo_kernel::sampling::SamplerKind;
 /// Largest number of shards of a plan.
 pub const MAX_SHARDS: u32 = 1 << 16;
 
-/// Number of the base, the samples that a plan started from. Shards have the numbers from 1.
+/// Shard number of the base, the samples that a plan started from. Other shards count from 1.
 pub const BASE: u32 = 0;
 
 /// Inputs of a plan's samples, and its noise target.
@@ -74,7 +74,7 @@ pub struct Plan {
 
 impl Plan {
     /// Creates the plan that continues from the samples of `schedule` to its noise target.
-    /// `usual_slopes`, of tiles that are not glossy and of glossy tiles, replace slopes that the
+    /// `usual_slopes` (for tiles that are not glossy, and for glossy tiles) replace slopes that the
     /// schedule has not measured. Returns `None` without a noise target or an estimate.
     pub fn of_schedule(
         schedule: &Schedule,
@@ -95,7 +95,8 @@ impl Plan {
         self.rays_of(self.tiles.iter().map(|tile| tile.end))
     }
 
-    /// Returns the expected number of rays of `counts` samples per pixel and replicate in the tiles.
+    /// Returns the expected number of rays for `counts`, samples per pixel and replicate of each
+    /// tile.
     fn rays_of(&self, counts: impl Iterator<Item = u32>) -> f64 {
         let samples = self.samples_of(counts);
         samples.zip(&self.tiles).map(|(n, t)| n as f64 * f64::from(t.rays_per_sample)).sum()

@@ -86,7 +86,7 @@ impl Part {
         (!shards.is_empty()).then_some(Self { plan: Arc::new(plan), shards, rays })
     }
 
-    /// Returns the numbers of the shards that are `wanted`.
+    /// Returns the numbers of the shards for which `wanted` returns `true`.
     pub(super) fn numbers(&self, wanted: impl Fn(&PartShard) -> bool) -> Vec<u32> {
         self.shards.iter().filter(|shard| wanted(shard)).map(|shard| shard.number).collect()
     }

@@ -27,10 +27,11 @@ pub struct ShardRender {
     pool: rayon::ThreadPool,
     /// Jobs that remain to be traced, in both replicates.
     remaining: Vec<Job>,
-    /// Numbers of samples of the complete shard and in the film, over all pixels and replicates.
+    /// Number of samples of the complete shard, and in the film so far, over all pixels and
+    /// replicates.
     samples: [u64; 2],
     pub rays: u64,
-    /// Samples and seconds of tracing in all steps so far.
+    /// Number of samples traced in all steps so far, and the seconds that they took.
     measured: (u64, f64),
 }
 

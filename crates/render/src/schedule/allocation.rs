@@ -19,7 +19,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use zerkalo_scene::value::{ascending, from_total_order, total_order};
 
-/// Rays of an adaptive round, as a share of the rays traced so far: small enough that later
+/// Rays of an adaptive round, as a share of the rays traced so far. It is small enough that later
 /// estimates can correct a round, and large enough that threads rarely wait for each other.
 const ROUND_SHARE: f64 = 0.1;
 /// Share of the rays of a round that goes to the tiles with the fewest samples, whatever their
@@ -29,8 +29,8 @@ const ROUND_SHARE: f64 = 0.1;
 /// 18 % with 1/16, 16 % with 1/8, 13 % with 1/4. Rays until the physical mirror room has an RMSE of
 /// 0.00068: 60.7 million with 1/32, 61.7 million with 1/16, 64.8 million with 1/8.
 pub(super) const EXPLORATION: f64 = 0.0625;
-/// Smallest number of blocks in a round, unless fewer tiles can get samples or fewer blocks meet
-/// the error target. It keeps every thread busy until the end of the round.
+/// Smallest number of blocks in a round, which keeps every thread busy until the end of the round.
+/// A round has fewer if fewer tiles can get samples or fewer blocks meet the error target.
 const MIN_BLOCKS: usize = 64;
 /// A tile whose next block would more than double its samples is set aside, because an estimate is
 /// reliable for one doubling only. The round ends when the largest gain of the remaining tiles is
@@ -46,18 +46,17 @@ const OWN_WEIGHT: f64 = 0.25;
 /// Ratio of true to reported error in 40 sparse pictures (`tests/error_estimates`, 48 to 64 seeds
 /// each): 1.02 to 1.55 without widening, 0.96 to 1.24 with 9 tiles, 0.94 to 1.23 with 17.
 const MIN_CLASS_TILES: f64 = 17.0;
-/// Largest distance between a class and a class that widens it. A distance is the number of factors
-/// of sqrt(2) between the allocation estimates plus the number between the sample counts.
+/// Largest distance between a class and a class that widens it. The distance is the number of
+/// factors of sqrt(2) between their allocation estimates, plus that between their sample counts.
 const MAX_CLASS_DISTANCE: u32 = 4;
 
 /// Block of samples that a round may give to a tile. Blocks are ordered by gain, then by fewer
 /// samples, then by the lower number of the tile.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Candidate {
-    /// Result of [`total_order`] for the gain: the expected decrease, per ray, of the sum of the
-    /// squared errors of all pixels.
+    /// Gain of the block, encoded by [`total_order`] as an integer of the same order.
     gain: i64,
-    /// Samples per pixel and replicate that the tile has before the block.
+    /// Samples per pixel and replicate of the tile before the block.
     pub count: Reverse<u32>,
     pub tile: Reverse<usize>,
 }
@@ -74,7 +73,7 @@ impl ErrorModel {
         self.scale * f64::from(count).powf(-2.0 * self.slope)
     }
 
-    /// Returns the model of the same slope through the mean squared error `mse` at `count` samples.
+    /// Returns the model with the same slope whose mean squared error at `count` samples is `mse`.
     fn through(&self, count: u32, mse: f64) -> Self {
         Self { scale: mse * f64::from(count).powf(2.0 * self.slope), ..*self }
     }
@@ -128,7 +127,7 @@ impl<'a> Allocation<'a> {
 
     /// Returns the number of samples per pixel and replicate in the next block of `tile`. Returns 0
     /// if the tile has reached its cap, or if one more sample per pixel would exceed the requested
-    /// mean.
+    /// mean number of samples per pixel.
     pub fn next_block(&self, tile: usize) -> u32 {
         let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
         let affordable =
@@ -148,8 +147,8 @@ impl<'a> Allocation<'a> {
         self.counts[tile] += samples;
     }
 
-    /// Allocates one block to one tile after another, those with the fewest samples first, until
-    /// the round has about `rays` rays.
+    /// Allocates one block to each of the tiles with the fewest samples, in ascending order of
+    /// their samples, until the round has about `rays` rays.
     pub fn explore(&mut self, rays: f64) {
         for tile in ascending(self.counts.iter().map(|count| i64::from(*count)).collect()) {
             if self.spent >= rays {
@@ -226,10 +225,10 @@ impl Schedule {
         self.tiles.iter().map(|t| tile_models(t, self.settings.criterion, pooled)).collect()
     }
 
-    /// Returns the expected error of each tile. At the present count it is the mean of the
-    /// validation estimates of the tile's class and of the tile's own allocation estimate, weighted
-    /// by pixels and [`OWN_WEIGHT`]. The own estimate keeps the expected error above 0 if the
-    /// validation estimates of the class are 0.
+    /// Returns the model of each tile's expected error. At the present sample count, the expected
+    /// error is the mean of the validation estimates of the tile's class and of the tile's own
+    /// allocation estimate, weighted by pixels and [`OWN_WEIGHT`]. The own estimate keeps the
+    /// expected error above 0 if the validation estimates of the class are 0.
     pub(super) fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);
@@ -253,10 +252,9 @@ impl Schedule {
     }
 }
 
-/// Returns the sum of the validation estimates of `class`, widened by its nearest classes until
-/// there are [`MIN_CLASS_TILES`] tiles or [`MAX_CLASS_DISTANCE`] is reached. Estimates of other
-/// classes are scaled to the allocation estimate of `class`. A class whose allocation estimate is 0
-/// is not widened.
+/// Returns the sum of the validation estimates of `class` and of its nearest classes, as many as
+/// give [`MIN_CLASS_TILES`] tiles within [`MAX_CLASS_DISTANCE`]. Estimates of other classes are
+/// scaled to the allocation estimate of `class`. If that is 0, the sum has no other classes.
 fn widened(class: Class, classes: &BTreeMap<Class, WeightedSum>) -> WeightedSum {
     let mut sum = classes[&class];
     let (octave, Some(half_octave)) = class else { return sum };

@@ -8,7 +8,7 @@ use crate::schedule::tile::{FLATTEST, STEEPEST, clamp_slope};
 const POINTS: usize = 7;
 
 /// Relative uncertainty of the extrapolated rays, even if the slope is well fitted. The slope
-/// decreases a little during the render, because exploration reduces the error less and less: two
+/// decreases a little during a render, because exploration reduces the error less and less. Two
 /// doublings at a slope of 0.75 need 4 to 10 % more rays than extrapolated.
 const SPREAD: f64 = 0.15;
 
@@ -38,7 +38,7 @@ impl Interval {
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConvergenceFit {
-    /// Numbers of rays with the RMSE of the picture, oldest first.
+    /// Points (number of rays, RMSE of the picture), oldest first.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -62,9 +62,9 @@ impl ConvergenceFit {
     }
 
     /// Estimates the total number of rays at which the RMSE falls to `target`. Three slopes are
-    /// fitted: over the latest two, four and six steps between points. The steepest slope gives the
-    /// lower end, the flattest slope the upper one. Before the first two steps, [`STEEPEST`] and
-    /// [`FLATTEST`] are used. Returns `None` before the first point.
+    /// fitted, over the latest two, four and six intervals between points. The steepest slope gives
+    /// the lower end, the flattest slope the upper one. Before there are two intervals,
+    /// [`STEEPEST`] and [`FLATTEST`] are used. Returns `None` before the first point.
     pub fn rays_needed(&self, target: f64) -> Option<Interval> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {

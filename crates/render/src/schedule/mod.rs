@@ -33,22 +33,23 @@ use tile::{FLATTEST, Tile, clamp_slope};
 /// would get a third of all samples in the scene of the mirror room, and two thirds in the scene of
 /// the reflecting tracks.
 const MIN_SAMPLES: u32 = 4;
-/// Value that replaces [`MIN_SAMPLES`] below [`FEW_PIXELS`] effective pixels: the picture has
-/// either no noise, or a few noisy pixels, which more samples find.
+/// Value that replaces [`MIN_SAMPLES`] if there are fewer than [`FEW_PIXELS`] effective pixels.
+/// Such a picture has no noise, or a few noisy pixels, which more samples find.
 const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
 /// Number of [`Noise::effective_pixels`] below which a noise estimate is unreliable. With k
 /// effective pixels the relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
-/// Divisor of all sample counts per pixel and replicate, except for smaller counts and counts after
-/// the last block of a tile. It is the width of the widest packets, on every processor, because the
-/// samples of a picture must not depend on the processor.
+/// Number of which sample counts per pixel and replicate are multiples, except for smaller counts
+/// and counts after the last block of a tile. It is the width of the widest packets, on every
+/// processor, because the samples of a picture must not depend on the processor.
 pub const SAMPLE_ALIGNMENT: u32 = 16;
 /// Samples per pixel and replicate at which a tile is full: the largest multiple of
 /// [`SAMPLE_ALIGNMENT`] whose double fits 32 bits.
 pub const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
-/// Returns the number of samples from `count` to the next multiple of [`SAMPLE_ALIGNMENT`]; 0 for
-/// a smaller `count`. A larger count is no multiple only if a stop criterion or a cap ended there.
+/// Returns the number of samples from `count` to the next multiple of [`SAMPLE_ALIGNMENT`]; 0 if
+/// `count` is smaller. A larger `count` is a multiple, unless a stop criterion or a cap has ended
+/// there.
 fn to_packet(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT { 0 } else { count.next_multiple_of(SAMPLE_ALIGNMENT) - count }
 }
@@ -71,7 +72,7 @@ pub struct Spp {
 /// Sample counts and noise estimates of the tiles of a render, and the jobs to trace next.
 #[derive(Clone, Debug, Default)]
 pub struct Schedule {
-    /// Settings. A finished render resumes if new stop criteria are not reached.
+    /// Settings. If stop criteria are set that are not reached, a finished render resumes.
     pub settings: Settings,
     tiles: Vec<Tile>,
     /// Jobs of the current round, each for both replicates.
@@ -89,11 +90,11 @@ pub struct Schedule {
     pub noise: Option<Noise>,
     /// Samples per pixel and replicate after the latest uniform round that ended with an estimate.
     estimated_at: u32,
-    /// Light period: the number of samples of a pixel that together trace a shadow ray to each light
-    /// once; see [`WorldInfo::light_period`](zerkalo_world::WorldInfo::light_period).
+    /// Light period: the number of samples of a pixel that together trace a shadow ray to each
+    /// light once; see [`WorldInfo::light_period`](zerkalo_world::WorldInfo::light_period).
     ///
-    /// The error falls steeply at this number of samples. Estimates from fewer samples do not
-    /// predict the error. They are discarded once a tile has an estimate from at least this number.
+    /// The error falls steeply at this number of samples, so that estimates from fewer samples do
+    /// not predict it. They are discarded once a tile has an estimate from at least this number.
     pub light_period: u32,
 }
 
@@ -134,8 +135,8 @@ impl Schedule {
         })
     }
 
-    /// Records the report of a wave that [`Schedule::next`] returned, or of the piece that
-    /// [`Wave::cut`] left. Jobs that were cut off or cancelled are part of a later wave.
+    /// Records the report of a wave that [`Schedule::next`] returned, or of the part of it that
+    /// [`Wave::cut`] kept. Jobs that were cut off or cancelled are part of a later wave.
     pub fn complete(&mut self, wave: &Wave, reports: &[Option<JobReport>]) {
         let mut reports = wave.jobs.iter().zip(reports).peekable();
         let mut partial = Vec::new();
@@ -214,9 +215,9 @@ impl Schedule {
         self.tiles.iter().map(|t| u64::from(t.pixels)).sum()
     }
 
-    /// Returns the cap of `tile`: its largest number of samples per pixel and replicate. It is half
-    /// of [`Settings::rays_per_pixel`], at least 1, in glossy tiles; [`MAX_SAMPLES`] in others, or
-    /// if that setting is 0.
+    /// Returns the cap of `tile`: its largest number of samples per pixel and replicate. For glossy
+    /// tiles it is half of [`Settings::rays_per_pixel`], at least 1. For other tiles, and if that
+    /// setting is 0, it is [`MAX_SAMPLES`].
     fn cap(&self, tile: &Tile) -> u32 {
         match self.settings.rays_per_pixel {
             0 => MAX_SAMPLES,
@@ -234,8 +235,8 @@ impl Schedule {
         (sum / pixels.max(1) as f64).sqrt()
     }
 
-    /// Returns the samples of each replicate, over all pixels, that are left until the requested
-    /// mean number of samples per pixel; `u64::MAX` if none is requested.
+    /// Returns the number of samples per replicate, over all pixels, that are missing to the
+    /// requested mean number of samples per pixel; `u64::MAX` if none is requested.
     fn samples_left(&self) -> u64 {
         let Some(spp) = self.settings.stop.spp else { return u64::MAX };
         (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(self.done())
@@ -269,8 +270,8 @@ impl Schedule {
     /// is the result of [`Schedule::common_count`].
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
-            // The count is between two powers if an earlier stop criterion has ended the render
-            // there.
+            // The count is between two powers of two if an earlier stop criterion has ended the
+            // render there.
             n if n < SAMPLE_ALIGNMENT => (n + 1).next_power_of_two() - n,
             n => {
                 (self.uniform_growth(n) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT)

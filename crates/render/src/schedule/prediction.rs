@@ -8,8 +8,8 @@ use crate::schedule::{Schedule, Settings};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Assumed slope before any tile has doubled its sample count. The scenes of the gallery have
-/// slopes of 0.57 to 0.8.
+/// Slope that is assumed before any tile has doubled its sample count. The scenes of the gallery
+/// have slopes of 0.57 to 0.8.
 pub const USUAL_SLOPE: f64 = 0.7;
 /// Error at which the prediction aims, as a share of the target. The true error exceeds the
 /// predicted one by 3 to 6 % (11 % in the worst of nine renders).
@@ -84,7 +84,7 @@ impl Schedule {
         let sum_of = |counts: &mut dyn Iterator<Item = u32>| -> f64 {
             counts.enumerate().map(|(tile, count)| tile_sum(tile, count)).sum()
         };
-        // The models are scaled to the reported error. It is the larger of two estimates and may
+        // The models are scaled to the reported error, which is the larger of two estimates and may
         // exceed the sum of the models.
         let modelled = sum_of(&mut self.tiles.iter().map(|tile| tile.done));
         let scale = if modelled > 0.0 { square_sum(rmse) / modelled } else { 1.0 };

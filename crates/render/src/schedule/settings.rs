@@ -50,7 +50,7 @@ pub enum StoppedBy {
 }
 
 impl StoppedBy {
-    /// Returns the name of the reason in printed statistics, which never changes.
+    /// Returns the name of the reason in printed statistics. It never changes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spp => "spp",
@@ -68,8 +68,8 @@ pub struct Settings {
     /// `true` if tiles may get different numbers of samples according to their noise.
     pub adaptive: bool,
     pub criterion: Criterion,
-    /// Largest number of samples per pixel and render in glossy tiles, over both replicates;
-    /// rounded down to an even number, at least 2. 0 means no limit.
+    /// Largest number of samples per pixel in glossy tiles, over both replicates; rounded down to
+    /// an even number, at least 2. 0 means no limit.
     pub rays_per_pixel: u32,
     pub stop: Stop,
 }

@@ -1,4 +1,4 @@
-//! State of a schedule as bytes, with which a later process continues it.
+//! Encoding of a schedule's state as bytes, from which a later process continues.
 //!
 //! All numbers are little-endian. A list starts with its length (u32); an option starts with 0
 //! (`None`) or 1 (u8). The parts are, in this order:

@@ -4,12 +4,12 @@ use crate::film::Noise;
 use crate::schedule::tile::{DOUBLINGS, Tile};
 use crate::schedule::{Criterion, Interval, MAX_SAMPLES, Schedule, StoppedBy};
 
-/// Number of effective pixels below which a single noise estimate does not end a render.
+/// Number of effective pixels below which one noise estimate is not enough to end a render.
 ///
-/// An estimate that is too low by chance ends a render too early. Ratio of true to reported RMSE at
-/// the end of simulated renders: 2.2 with 3 effective pixels, 1.49 with 6, 1.22 with 12. If the
-/// estimates before the latest three doublings must be below the target as well, the ratios are
-/// 1.56, 1.23 and 1.11.
+/// An estimate that is too low by chance would end a render too early. The ratio of true to
+/// reported RMSE at the end of simulated renders is 2.2 with 3 effective pixels, 1.49 with 6, and
+/// 1.22 with 12. If the estimates before the latest three doublings must meet the target as well,
+/// the ratios are 1.56, 1.23 and 1.11.
 const FEW_PIXELS_TO_STOP: f64 = 64.0;
 
 impl Schedule {
@@ -87,10 +87,10 @@ impl Schedule {
         stop.seconds.filter(|limit| started && seconds >= *limit).map(|_| StoppedBy::Time)
     }
 
-    /// Returns the latest estimate, on which the end of the render depends. With fewer effective
-    /// pixels than [`FEW_PIXELS_TO_STOP`], its RMSE is raised to the largest RMSE before each of
-    /// the latest three doublings, scaled to the present counts. Estimates on both sides of a
-    /// doubling are nearly independent. Returns `None` before the first estimate.
+    /// Returns the noise estimate on which the end of the render depends: the latest one. With
+    /// fewer effective pixels than [`FEW_PIXELS_TO_STOP`], its RMSE is raised to the largest RMSE
+    /// before each of the latest three doublings, scaled to the present counts. Estimates before
+    /// and after a doubling are nearly independent. Returns `None` before the first estimate.
     pub(super) fn largest_recent_noise(&self) -> Option<Noise> {
         let latest = self.noise?;
         if self.settings.criterion.of(latest.effective_pixels) >= FEW_PIXELS_TO_STOP {

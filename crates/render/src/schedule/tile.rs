@@ -71,8 +71,8 @@ impl Tile {
         self.error.map_or(0.0, |e| criterion.of(e.reported))
     }
 
-    /// Iterates over the estimates: sample count, and mean squared errors of allocation and
-    /// validation pixels.
+    /// Iterates over the estimates: sample count, then the mean squared errors of the allocation
+    /// and the validation estimate.
     pub fn estimates(&self, criterion: Criterion) -> impl Iterator<Item = (f64, [f64; 2])> {
         let latest = self.error.filter(|e| self.history.last() != Some(e));
         let all = self.history.iter().copied().chain(latest);
@@ -81,9 +81,9 @@ impl Tile {
         })
     }
 
-    /// Returns the estimate before the latest `doublings` doublings of the sample count, scaled to
-    /// the present count as [`USUAL_SLOPE`] predicts. If there were fewer doublings, it is the
-    /// oldest estimate. Returns `None` before the first estimate.
+    /// Returns the estimate before the latest `doublings` doublings of the sample count, or the
+    /// oldest estimate if there were fewer. It is scaled to the present count as [`USUAL_SLOPE`]
+    /// predicts. Returns `None` before the first estimate.
     pub fn earlier_estimate(&self, doublings: usize) -> Option<TileNoise> {
         let latest = self.error?;
         let earlier = self.history.iter().rev().nth(doublings).or(self.history.first())?;
@@ -95,7 +95,7 @@ impl Tile {
         Some(TileNoise { reported, allocation, ..latest })
     }
 
-    /// Returns sample count and allocation estimate before and after the latest doubling. Returns
+    /// Returns (sample count, allocation estimate) before and after the latest doubling. Returns
     /// `None` before the first doubling.
     pub fn last_doubling(&self, criterion: Criterion) -> Option<[(f64, f64); 2]> {
         let [.., before, after] = self.history.as_slice() else { return None };

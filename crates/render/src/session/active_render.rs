@@ -18,15 +18,15 @@ use zerkalo_scene::Scene;
 /// Target durations in seconds of a piece of a wave: while the client requests a picture or a
 /// pixel, and while it requests neither.
 const PIECE_SECONDS: [f64; 2] = [0.05, 0.25];
-/// Time constant in seconds of the mean speed of tracing.
+/// Time constant in seconds of the moving average of the tracing speed.
 const SPEED_SECONDS: f64 = 1.0;
 /// Target duration in seconds of a job. A running job cannot be cancelled.
 const JOB_SECONDS: f64 = 0.005;
 const TILE_PIXELS: f64 = crate::film::TILE_PIXELS as f64;
 /// Longest expected duration, in seconds, of a first-hit buffer that is traced before the first
-/// picture. A slower buffer is traced after the picture.
+/// picture. Another buffer is traced after the picture.
 const FIRST_HITS_SECONDS: f64 = 0.002;
-/// Assumed seconds per ray of a first-hit buffer until one has been measured: those of a small
+/// Assumed seconds per ray of a first-hit buffer before the first measurement; typical of a small
 /// scene.
 const FIRST_HIT_RAY_SECONDS: f64 = 5e-8;
 
@@ -42,8 +42,9 @@ pub(super) struct WorkContext {
 }
 
 impl WorkContext {
-    /// Returns `true` if a snapshot should be published now. A picture takes time. It is published
-    /// only if the client has taken the previous one, or at the end of the render (`is_final`).
+    /// Returns `true` if a snapshot should be published now. A picture takes time to create. It is
+    /// therefore published only if the client has taken the previous one, or at the end of the
+    /// render (`is_final`).
     fn snapshot_wanted(&self, is_final: bool) -> bool {
         is_final || self.view == View::default() || self.published.is_empty()
     }
@@ -51,7 +52,7 @@ impl WorkContext {
     /// Publishes a snapshot, which replaces one that the client has not taken.
     pub fn put(&self, snapshot: Snapshot) {
         let _ = self.published.try_recv();
-        // Only this thread sends, so that the channel is empty.
+        // Only this thread sends, so that the channel is still empty.
         let _ = self.publisher.try_send(snapshot);
     }
 }
@@ -69,13 +70,13 @@ pub(super) struct ActiveRender {
     pub first_picture_after: Option<Duration>,
     /// `true` if light weights or display transform have changed since the errors were estimated.
     pub estimates_stale: bool,
-    /// Mean samples per second of about the latest second of tracing. `None` before the first
-    /// measurement.
+    /// Average of the samples traced per second, over about the latest second. `None` before the
+    /// first measurement.
     speed: Option<f64>,
     inventory: Arc<str>,
     downsample: Option<IncrementalDownsample>,
     first_hits: Option<Arc<FirstHitBuffer>>,
-    /// Seconds per ray of the latest first-hit buffer.
+    /// Seconds per ray that the latest first-hit buffer took.
     first_hit_ray_seconds: f64,
 }
 
@@ -97,7 +98,7 @@ impl ActiveRender {
         }
     }
 
-    /// Compiles `scene` and starts its render, in the memory of the film of `previous`. Fails with
+    /// Compiles `scene` and starts its render, which reuses the memory of `previous`. Fails with
     /// the first validation error of the scene, or if there is not enough memory.
     pub fn start(
         scene: &Arc<Scene>,
@@ -115,8 +116,8 @@ impl ActiveRender {
         Ok(Self { first_hit_ray_seconds, ..Self::new(state, schedule, started) })
     }
 
-    /// Continues the render of `checkpoint` as a picture of `scene`, whose lights may differ. Fails
-    /// if the checkpoint cannot be used for this scene.
+    /// Continues the render of `checkpoint` with the lights of `scene`. Fails if the checkpoint
+    /// cannot be used for this scene.
     pub fn resume(
         scene: &Arc<Scene>,
         options: &Options,
@@ -144,8 +145,8 @@ impl ActiveRender {
         self.traced_for.as_secs_f64()
     }
 
-    /// Makes the film a picture of `scene` and returns `true`. Returns `false`, without a change,
-    /// if the samples are not valid for it.
+    /// Shows `scene` by a change of light weights and returns `true`. Returns `false`, without a
+    /// change, if `scene` has faults or needs new samples.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let weights = self.state.weights.clone();
         if !self.state.try_reuse(scene) {
@@ -224,8 +225,8 @@ impl ActiveRender {
                 self.complete(&wave, &report, traced_for);
                 self.first_picture_after.get_or_insert_with(|| self.started.elapsed());
             }
-            // Either a newer command is waiting, or the client raised the flag for this scene only
-            // after the worker had lowered it.
+            // The pass was cancelled: a newer command is waiting, or the client raised the flag for
+            // this scene only after the worker had lowered it.
             None => {
                 self.traced_for += traced_for;
                 self.state.film.restart();
@@ -244,8 +245,8 @@ impl ActiveRender {
         wave.cut((speed * seconds) as u64, longest.max(SAMPLE_ALIGNMENT))
     }
 
-    /// Traces the first-hit buffer that the client has requested, unless it exists already, or
-    /// would take longer than `limit` seconds.
+    /// Traces the first-hit buffer that the client has requested, unless it exists already or is
+    /// expected to take longer than `limit` seconds.
     fn update_first_hits(&mut self, context: &WorkContext, limit: f64) {
         let Some([columns, rows]) = context.view.raster else { return };
         if self.first_hits.as_ref().is_some_and(|f| [f.columns, f.rows] == [columns, rows]) {
@@ -265,7 +266,7 @@ impl ActiveRender {
         self.first_hit_ray_seconds = start.elapsed().as_secs_f64() / rays.max(1.0);
     }
 
-    /// Creates a snapshot without what it shows of the film.
+    /// Creates a snapshot without the parts that [`Snapshot::with_view`] adds.
     fn snapshot(&self, context: &WorkContext, state: State) -> Snapshot {
         Snapshot {
             report: self.report(context, state),

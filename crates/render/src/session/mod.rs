@@ -2,7 +2,7 @@
 //! publishes snapshots.
 //!
 //! A client first sends a command and then raises the cancel flag of the running wave. The
-//! rendering thread first lowers the flag and then receives all commands. In the reverse order, it
+//! session's thread first lowers the flag and then receives all commands. In the reverse order, it
 //! could lower the flag without receiving the command, which would then wait until the wave ends.
 //! If several scenes are waiting, only the newest is compiled. A cancelled wave loses no samples:
 //! its remaining jobs are traced when the render resumes.
@@ -45,11 +45,11 @@ use watch::Watcher;
 use worker::Worker;
 use zerkalo_scene::Scene;
 
-/// Function that a client queues to run on the session's thread. It gets the picture, or `None` if
-/// there is no film.
+/// Function that a client queues to run on the session's thread. The argument is the picture, or
+/// `None` if there is no film.
 type Task = Box<dyn FnOnce(Option<Picture>) + Send>;
 
-/// Command to the session's thread. The numbers are generations.
+/// Command to the session's thread. The numbers are generations of scenes.
 enum Command {
     Scene(u64, Arc<Scene>),
     Resume(u64, Arc<Scene>, Box<Checkpoint>),
@@ -65,9 +65,9 @@ enum Command {
 /// State that the handle and the thread share in addition to the command channel.
 #[derive(Default)]
 struct Shared {
-    /// Cancels the wave being traced, because commands are waiting.
+    /// Request to cancel the running wave, because commands are waiting.
     cancel_wave: AtomicBool,
-    /// Cancels the first pass over the picture, because a newer scene is waiting.
+    /// Request to cancel the first pass, because a newer scene is waiting.
     cancel_first_pass: AtomicBool,
     /// Number of scenes compiled so far.
     #[cfg(test)]
@@ -135,8 +135,7 @@ impl Session {
     }
 
     /// Renders `scene` from now on, with the present samples if they are valid for it (see
-    /// [`Relighting::weights`]). Returns the generation of the scene, a number that its reports
-    /// contain; it increases with each scene.
+    /// [`Relighting::weights`]). Returns the generation of the scene, which its reports contain.
     ///
     /// [`Relighting::weights`]: crate::Relighting::weights
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> u64 {
@@ -181,8 +180,8 @@ impl Session {
         self.send(Command::Task(Box::new(task)));
     }
 
-    /// Runs `task` as [`Session::submit`] does and waits for its result. Returns `None` without a
-    /// render.
+    /// Runs `task` as [`Session::submit`] does and waits for its result. Returns `None` if the
+    /// session has no render.
     pub fn with<R: Send + 'static>(
         &self,
         task: impl FnOnce(&RenderState, &Report) -> R + Send + 'static,

@@ -20,15 +20,15 @@ pub struct Picture<'a> {
 
 /// Source of a session's samples.
 pub(super) enum Source<'a> {
-    /// Render, and the threads that encode its checkpoints.
+    /// The session's render, and the threads that encode its checkpoints.
     Render(&'a ActiveRender, &'a rayon::ThreadPool),
-    /// Header of the sum of watched films.
+    /// Watched film files. The header is that of their sum.
     Files(&'a FilmFileHeader),
 }
 
 impl<'a> Picture<'a> {
-    /// Creates the header with which the picture is written as a film file or an image.
-    /// `provenance` returns the origin of a rendered scene; watched films state their own origin.
+    /// Creates the header of a film file or image of the picture. `provenance` returns the origin
+    /// of a rendered scene; watched films state their own origin.
     pub fn header(&self, provenance: impl FnOnce(&Scene) -> Provenance) -> FilmFileHeader {
         match self.source {
             Source::Render(render, _) => {

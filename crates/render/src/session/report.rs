@@ -42,7 +42,8 @@ pub struct Report {
     /// Estimated seconds left until each of the [`QUALITIES`] is reached, whatever the stop criteria
     /// are.
     pub quality_seconds: [Option<Interval>; QUALITIES.len()],
-    /// Share of the render that is done, 0..=1: of the expected time, or of the samples of a plan.
+    /// Share of the render that is done, 0..=1: of the expected time or, for watched films, of the
+    /// samples of their plan.
     pub progress: Option<f64>,
     /// Number of samples that were NaN or negative and count as black.
     pub bad_samples: u64,
@@ -50,7 +51,7 @@ pub struct Report {
     pub saturated_samples: u64,
     /// Number of pixels with a full integer sum, which further samples make too dark.
     pub saturated_pixels: u64,
-    /// Samples per second, over all pixels, of about the latest second; 0 before the first
+    /// Average of the samples traced per second over about the latest second; 0 before the first
     /// measurement.
     pub recent_samples_per_second: f64,
     pub threads: usize,
@@ -64,13 +65,13 @@ pub struct Report {
 }
 
 impl Report {
-    /// Creates the report of a film that no session renders, with its error under `weights` and
+    /// Creates the report of a film that no session renders, with its noise under `weights` and
     /// `display`.
     pub fn of_film(film: &Film, weights: &LightWeights, display: &Display) -> Self {
         Self { noise: film.noise(weights, display), ..Self::of_samples(film) }
     }
 
-    /// Creates the report of a film without its error.
+    /// Creates the report of a film without its noise.
     pub(super) fn of_samples(film: &Film) -> Self {
         let counts = (0..film.tile_count()).map(|tile| film.spp(tile));
         let (min, max) = counts.fold((u32::MAX, 0), |(min, max), n| (min.min(n), max.max(n)));
@@ -97,7 +98,7 @@ impl Report {
         counts.into_iter().filter(|(n, ..)| *n > 0).map(warning).collect()
     }
 
-    /// Returns the mean samples per second, over all pixels, since the start of the render.
+    /// Returns the mean number of samples traced per second since the start of the render.
     pub fn samples_per_second(&self) -> f64 {
         if self.seconds > 0.0 { self.samples as f64 / self.seconds } else { 0.0 }
     }

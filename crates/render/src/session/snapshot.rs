@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use zerkalo_scene::Scene;
 
-/// Contents that a client requests of snapshots.
+/// Parts of a snapshot that a client requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct View {
     /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::first_hits`]. `None` requests
@@ -44,14 +44,14 @@ pub struct Snapshot {
 
 impl Snapshot {
     /// Returns the light weights with which this picture shows `scene`, which may be newer than the
-    /// snapshot. Returns `None` if `scene` needs new samples.
+    /// snapshot. `None` if `scene` needs new samples.
     pub fn weights_for(&self, scene: &Scene) -> Option<LightWeights> {
         self.lighting.as_ref()?.weights(scene)
     }
 
-    /// Adds what the client has requested of `film`. `estimates` are the errors of the tiles, or
-    /// nothing before the first estimate. `downsample` caches the contributions of tiles to the
-    /// picture, so that only changed tiles are read again.
+    /// Adds the parts that the client has requested. `estimates` are the errors of the tiles of
+    /// `film`, empty before the first estimate. `downsample` caches the contributions of tiles to
+    /// the picture, so that only changed tiles are read again.
     pub(super) fn with_view(
         mut self,
         film: &Film,

@@ -1,5 +1,5 @@
-//! Tests of sessions with small scenes. The expensive scene has a camera inside of a mirroring
-//! sphere, where every path is long.
+//! Tests of sessions with small scenes. The expensive scene has a camera inside a mirroring sphere,
+//! where every path is long.
 
 use crate::film::Noise;
 use crate::schedule::{Criterion, Interval, Spp, Stop, StoppedBy};
@@ -103,8 +103,8 @@ fn newest_scene_is_never_lost() {
     }
 }
 
-/// Checks that a wait returns no snapshot of an earlier scene, whose last one the test has taken
-/// without waiting.
+/// Checks that a wait after a new scene returns no snapshot of the scene before. The test has taken
+/// the last snapshot of that scene without waiting.
 #[test]
 fn wait_returns_snapshots_of_the_newest_scene() {
     let mut session = session(Stop { spp: Some(8), ..Stop::default() });

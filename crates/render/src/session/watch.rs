@@ -16,8 +16,8 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Interval at which the watched film files are checked.
 const POLL: Duration = Duration::from_secs(1);
-/// Smallest pause after a check of the watched files, as a multiple of the duration of this check.
-/// With 2, checks take at most a third of the time.
+/// Shortest pause after a check of the watched files, in units of the duration of the check. With
+/// 2, checks take at most a third of the time.
 const REST: u32 = 2;
 
 /// State of the film files that a session watches. Size, display transform and scene file come from
@@ -46,7 +46,7 @@ pub(super) struct Watcher {
     context: WorkContext,
     /// Display transform that the client has set in place of the one in the film files.
     display: Option<Display>,
-    /// `None` without a film.
+    /// Picture of the sum of all films. `None` without a film.
     shown: Option<Shown>,
     downsample: Option<IncrementalDownsample>,
 }

@@ -25,7 +25,7 @@ pub(super) struct Worker {
     pending: bool,
     /// `true` if the render of `newest` must start with an empty film, whatever samples there are.
     restart: bool,
-    /// Scene to show, and the checkpoint from which its render continues.
+    /// Scene of a waiting [`Command::Resume`], and the checkpoint from which its render continues.
     resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
     tasks: Vec<Task>,
     paused: bool,
@@ -73,7 +73,8 @@ impl Worker {
     /// Receives all queued commands, or waits for one if there is no work. Returns `Break` if the
     /// session ends.
     fn listen(&mut self) -> ControlFlow<()> {
-        // The flags are lowered before commands are received, see the module `session`.
+        // The flags are lowered before commands are received; the module `session` gives the
+        // reason.
         self.context.shared.cancel_wave.swap(false, Ordering::AcqRel);
         self.context.shared.cancel_first_pass.swap(false, Ordering::AcqRel);
         if self.idle {

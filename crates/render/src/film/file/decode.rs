@@ -114,7 +114,7 @@ impl<R: Read> FilmReader<R> {
         Ok(SavedFilm { header, film })
     }
 
-    /// Adds the samples of the file to `film`, which may contain some of them after an error.
+    /// Adds the samples of the file to `film`. After an error, `film` may contain some of them.
     pub fn add_to(self, film: &mut Film) -> Result<FilmFileHeader, FileError> {
         film.check_header(&self.header.film)
             .map_err(|what| self.input.error(what, "name a file of the same render"))?;

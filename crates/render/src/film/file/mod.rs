@@ -25,8 +25,8 @@
 //!   number of bytes that its largest sum needs (u8, 0 to 8). The sums of the pixels inside the
 //!   picture follow row by row, each with this number of bytes.
 //!
-//! The file takes about 60 % of the film's size in memory. The encoding takes less time than
-//! writing the other 40 % to disk would.
+//! The file takes about 60 % of the film's size in memory. The compact encoding saves time, because
+//! writing the other 40 % to disk would take longer.
 
 mod decode;
 mod encode;

@@ -4,7 +4,7 @@ use crate::film::TILE;
 use crate::film::file::decode::Fields;
 use crate::film::tile::{TILE_PIXELS, Tile};
 
-/// Largest value of a sample times the scale of its light group.
+/// Largest integer that one sample adds to a sum.
 const LARGEST_SAMPLE: u64 = 1 << 49;
 
 /// Bytes of an integer sum in memory.
@@ -31,7 +31,7 @@ pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     }
 }
 
-/// Appends a plane to `out`: sum `i` of each pixel.
+/// Appends the plane of sum `i`, that is, this sum of each pixel, to `out`.
 fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     let all = pixels.iter().fold(0, |all, sums| all | sums[i] as u64);
     let bytes = (64 - all.leading_zeros()).div_ceil(8) as usize;

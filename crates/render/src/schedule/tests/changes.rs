@@ -4,9 +4,8 @@
 use crate::schedule::tests::*;
 
 /// Renders the simulated picture to the end in pieces. Before each wave is traced, [`Wave::cut`]
-/// shortens its jobs to at most `longest` samples per pixel. It then keeps jobs with
-/// about `tiles` times `longest` samples per pixel in total. Later waves have the samples
-/// that were cut off.
+/// shortens its jobs to at most `longest` samples per pixel. It then keeps jobs with about `tiles`
+/// times `longest` samples per pixel in total. Later waves trace what was cut off.
 fn finish_in_pieces(
     model: &mut Model,
     schedule: &mut Schedule,

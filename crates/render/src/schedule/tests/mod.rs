@@ -11,9 +11,8 @@ use crate::schedule::*;
 use crate::wave::JobReport;
 use crate::wave::WaveReport;
 
-/// Value of [`TileNoise::squares`] in all simulated estimates: the sum of e^2 over the pixels of a
-/// tile, where e is the squared error of a pixel. It is nearly 0, as for an error that is spread
-/// over very many pixels.
+/// Value of [`TileNoise::squares`] in all simulated estimates: that of an error spread over very
+/// many pixels.
 const SPREAD_OUT: ByMeasure = ByMeasure { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
 /// Light period of the simulated pictures, in samples per replicate. From this count on, the tiles
 /// in [`Model::periodic`] have no error.
