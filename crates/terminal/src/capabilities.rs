@@ -14,7 +14,6 @@ pub enum Multiplexer {
 /// Values of the environment variables that describe the terminal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Environment {
-    /// Value of `TERM`.
     pub term: String,
     /// Value of `COLORTERM`, such as `truecolor`.
     pub color_term: String,
@@ -26,7 +25,7 @@ pub struct Environment {
     pub multiplexer: Option<Multiplexer>,
 }
 
-/// Capabilities of the terminal. A field is `None` without a reply.
+/// Capabilities of the terminal. A field is `None` if the terminal has not reported its value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Capabilities {
     pub environment: Environment,
@@ -51,7 +50,8 @@ pub struct Capabilities {
     pub sixel_px: Option<[u16; 2]>,
     /// Width and height of a cell in pixels.
     pub cell_px: Option<[u16; 2]>,
-    /// Time from the first request to the first reply, which a multiplexer sends if there is one.
+    /// Time from the first request to the first reply. Inside a multiplexer, the multiplexer
+    /// replies.
     pub round_trip: Option<Duration>,
     /// Round-trip time to the terminal outside the multiplexer; `None` if the multiplexer passes no
     /// requests on.
@@ -81,7 +81,7 @@ impl Environment {
 
     /// Returns the set of colours that the environment alone suggests.
     pub fn colors(&self) -> Colors {
-        /// Values of `TERM` with 24-bit colour, besides `*-direct` and `*-truecolor`.
+        /// Values of `TERM` of terminals with 24-bit colour, besides `*-direct` and `*-truecolor`.
         const TRUE: [&str; 8] = [
             "xterm-kitty",
             "alacritty",

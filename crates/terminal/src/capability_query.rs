@@ -1,8 +1,8 @@
 //! Query of the terminal's capabilities before the first frame.
 //!
-//! All requests are sent in one write, and terminals reply in the order of the requests. Every
-//! terminal replies to the last request, for the device attributes; this reply ends the query. A
-//! later reply is still decoded as a reply and not as keys.
+//! All requests are sent in one write, and terminals reply in the order of the requests. The last
+//! request asks for the device attributes. Every terminal replies to it, and this reply ends the
+//! query. A later reply is still decoded as a reply and not as keys.
 
 use crate::capabilities::{Capabilities, Environment, Multiplexer};
 use crate::cells::Colors;
@@ -20,7 +20,7 @@ const PATIENCE_OVER_SSH: Duration = Duration::from_secs(2);
 /// Interval at which the query checks if it should stop.
 const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Request of the device attributes (DA1), to which every terminal replies.
+/// Request for the device attributes (DA1), to which every terminal replies.
 const ATTRIBUTES: &str = "\x1b[c";
 /// Requests of the capability query, in this order:
 /// - a 24-bit colour is set, the current colour is requested (DECRQSS), and the default is restored
@@ -33,18 +33,20 @@ const ATTRIBUTES: &str = "\x1b[c";
 /// - width and height of a cell in pixels
 const REQUESTS: &str = "\x1b[48;2;1;2;3m\x1bP$qm\x1b\\\x1b[0m\x1b[>q\x1b]11;?\x1b\\\x1b[?2026$p\
                          \x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\\x1b[?1;1;0S\x1b[?2;1;0S\x1b[16t";
-/// Requests that tmux passes on: a test of kitty's graphics protocol, and XTVERSION.
+/// Requests that tmux passes on to the terminal: a test of kitty's graphics protocol, and
+/// XTVERSION.
 const REQUESTS_THROUGH_TMUX: &str = "\x1bPtmux;\x1b\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\x1b\\\x1b\\\
                                       \x1bPtmux;\x1b\x1b[>q\x1b\\";
 /// First version of kitty with Unicode placeholders: `[major, minor]`.
 const PLACEHOLDERS_SINCE: [u32; 2] = [0, 28];
-/// Forms in which terminals with 24-bit colour report red 1, green 2, blue 3 (DECRQSS).
+/// Forms in which terminals with 24-bit colour report the colour that [`REQUESTS`] sets.
 const TRUE_COLOR: [&str; 3] = ["2::1:2:3", "2:1:2:3", "2;1;2;3"];
 /// Number of the private mode for synchronised updates.
 const SYNCHRONISED: u16 = 2026;
 
-/// Returns the request of the terminal's status (DSR 5), to which every terminal replies when it has
-/// processed all earlier bytes. It is wrapped to pass through a multiplexer.
+/// Returns the request for the terminal's status (DSR 5), to which every terminal replies when it
+/// has processed all earlier bytes. The request is wrapped to pass through the multiplexer
+/// `through`.
 pub fn status_request(through: Option<Multiplexer>) -> &'static str {
     match through {
         None => "\x1b[5n",
@@ -57,8 +59,8 @@ pub fn status_request(through: Option<Multiplexer>) -> &'static str {
 /// that are pressed during the query are kept in `input`. `is_ending` returns `true` if the query
 /// should stop.
 ///
-/// The query does not wait for a terminal outside a local tmux, which may never reply. The caller
-/// passes such a late reply to [`Capabilities::learn`].
+/// Inside a local tmux, the query does not wait for the terminal outside tmux, which may never
+/// reply. The caller passes a late reply to [`Capabilities::learn`].
 ///
 /// # Errors
 /// Fails if the terminal is closed.
@@ -90,8 +92,8 @@ pub fn query_capabilities(
     Ok(capabilities)
 }
 
-/// Measures the round trip to the terminal outside a multiplexer, if there is one, by a request of
-/// its status.
+/// Measures the round trip to the terminal outside the multiplexer, by a request for its status.
+/// Does nothing without a multiplexer.
 ///
 /// # Errors
 /// Fails if the terminal is closed.
@@ -114,8 +116,8 @@ pub fn query_passthrough(
     })
 }
 
-/// Passes replies to `take` until it returns `true`, `deadline` has come, or `is_ending` returns
-/// `true`. Other events are kept in `input`.
+/// Passes replies and their times to `take` until it returns `true`, `deadline` has come, or
+/// `is_ending` returns `true`. Other events are kept in `input`.
 fn listen(
     input: &mut InputReader,
     deadline: Instant,

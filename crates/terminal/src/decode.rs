@@ -26,8 +26,8 @@ use crate::sequence::{Interpreter, console_key, single_shift, x10_mouse};
 use crate::{Event, Key, Reply};
 use std::time::Duration;
 
-/// Longest pause after the first two bytes of an escape sequence. After a longer pause, the two
-/// bytes are a key pressed with Alt.
+/// Longest pause after the first two bytes of an escape sequence. After a longer pause, the second
+/// byte is a key pressed with Alt.
 const INTRODUCER_WAIT: Duration = Duration::from_millis(500);
 /// Longest pause inside an escape sequence.
 const SEQUENCE_WAIT: Duration = Duration::from_secs(2);
@@ -53,9 +53,9 @@ enum State {
     /// UTF-8 character of several bytes.
     Character,
     Escape,
-    /// ESC and this byte, which begin a sequence or are a key pressed with Alt.
+    /// After ESC and this byte, which begin a sequence or are a key pressed with Alt.
     Introducer(u8),
-    /// `ESC O` and decimal digits of this number, the modifiers of the key that follows.
+    /// After `ESC O` and the digits of this number, which encodes the modifiers of the next key.
     SingleShift(u16),
     /// Control sequence, after `ESC [`.
     ControlSequence,
@@ -63,7 +63,7 @@ enum State {
     Console,
     /// Mouse report of the X10 protocol, after `ESC [ M`.
     X10Mouse,
-    /// Control string, which began with ESC and this byte.
+    /// Control string that ESC and this byte began.
     String(u8),
     /// ESC inside a control string. A backslash ends the string.
     StringEscape,
@@ -155,7 +155,7 @@ impl Decoder {
         }
     }
 
-    /// Decodes a byte outside of sequences.
+    /// Decodes a byte outside sequences.
     fn character(&mut self, byte: u8) {
         match (self.state, byte) {
             (State::Ground, ESC) => {
@@ -336,8 +336,8 @@ impl Decoder {
     }
 }
 
-/// Returns `true` if the result of one read can only be the remainder of a reply whose ESC was read
-/// before. Typed characters would not arrive together.
+/// Returns `true` if the result of one read can only be the rest of a reply whose ESC was read
+/// before. The bytes of typed keys would not arrive in one read.
 fn is_reply_without_escape(bytes: &[u8]) -> bool {
     matches!(
         bytes,

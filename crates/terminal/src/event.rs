@@ -32,7 +32,7 @@ pub struct Key {
     pub code: Code,
     pub ctrl: bool,
     pub alt: bool,
-    /// `true` if Shift is pressed, except for characters.
+    /// `true` if Shift is pressed; always `false` for characters.
     pub shift: bool,
 }
 
@@ -43,7 +43,6 @@ impl Key {
     }
 }
 
-/// Kind of a mouse event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MouseKind {
     Press(Button),
@@ -69,7 +68,8 @@ pub struct Mouse {
     pub column: u16,
     /// Row, counted from 0.
     pub row: u16,
-    /// `true` if Control or Alt is pressed. Most terminals use Shift themselves.
+    /// `true` if Control or Alt is pressed. Shift does not count, because most terminals use it
+    /// themselves.
     pub modified: bool,
 }
 

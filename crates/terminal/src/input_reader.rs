@@ -28,7 +28,7 @@ pub struct InputReader {
 }
 
 impl InputReader {
-    /// Creates a reader, which waits longer for the byte after an ESC over SSH.
+    /// Creates a reader. Over SSH it waits longer for the byte after an ESC.
     pub fn new(environment: &Environment) -> Self {
         let wait = if environment.ssh.is_some() { ESCAPE_WAIT_OVER_SSH } else { ESCAPE_WAIT };
         Self {
@@ -39,7 +39,7 @@ impl InputReader {
         }
     }
 
-    /// Waits for events, at most until `deadline`. The list is empty if none came until then.
+    /// Waits for events until `deadline`. Returns an empty list if none came.
     ///
     /// # Errors
     /// Fails if the terminal is closed.

@@ -115,7 +115,7 @@ impl Drop for Screen {
     }
 }
 
-/// Locks `mutex`, even after a panic, which restores the terminal.
+/// Locks `mutex`, even if a thread panicked with the lock: the terminal must be restored.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -152,7 +152,7 @@ impl Tty {
         if !self.entered.swap(false, Ordering::AcqRel) {
             return false;
         }
-        // The terminal may have stopped reading.
+        // If the terminal has stopped reading, another thread may hold the lock without limit.
         if let Some(mut out) = self.lock_within(PATIENCE) {
             let mut bytes = std::mem::take(&mut *locked(&self.exit_sequence));
             bytes.extend(LEAVE.as_bytes());
@@ -161,13 +161,13 @@ impl Tty {
         }
         if let Some(modes_before) = &self.modes_before {
             let _ = set_modes(modes_before);
-            // The shell would read late replies.
+            // The shell would otherwise read late replies.
             let _ = tcflush(io::stdin(), QueueSelector::IFlush);
         }
         true
     }
 
-    /// Resumes full-screen use, even if other programs have changed the modes.
+    /// Resumes full-screen use, even if other programs have changed the modes of the terminal.
     ///
     /// # Errors
     /// Fails if the terminal is closed.

@@ -82,7 +82,7 @@ impl Perform for Interpreter {
     }
 }
 
-/// Returns the key that types `c`; `None` for control characters that no key types.
+/// Returns the key that sends `c`; `None` for control characters that no key sends.
 fn character(c: char) -> Option<Key> {
     let ctrl = |c: char| Key { ctrl: true, ..Key::plain(Code::Char(c)) };
     Some(match c {
@@ -97,8 +97,8 @@ fn character(c: char) -> Option<Key> {
     })
 }
 
-/// Interprets a control sequence by its parameters with subparameters, its private marker and
-/// intermediate bytes, and its final byte.
+/// Interprets a control sequence. `params` are its parameters, each with subparameters;
+/// `intermediates` are its private marker and intermediate bytes; `last` is its final byte.
 fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Option<Event> {
     let numbers: Vec<_> = params.iter().map(|param| param[0]).collect();
     let reply = match (intermediates, last, &numbers[..]) {
@@ -113,7 +113,7 @@ fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Opti
         (b"", 'n', [0]) => Reply::Status,
         (b"", 't', &[6, height, width]) => Reply::CellSize([width, height]),
         (b"", 'n' | 't' | 'x' | 'c', _) => Reply::Other,
-        // A position of the cursor. In row 1 it may be F3 with modifiers, 2 to 16.
+        // Position of the cursor. For row 1, columns 2 to 16 are decoded as F3 with modifiers.
         (b"", 'R', [(2..), _] | [1, ..2 | 17..]) => Reply::Other,
         (b"", ..) => return key(params, last).map(Event::Key),
         _ => Reply::Other,
@@ -121,7 +121,7 @@ fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Opti
     Some(Event::Reply(reply))
 }
 
-/// Returns the key of a control sequence; `None` for a release or an unknown key.
+/// Returns the key that a control sequence reports; `None` for a key release or an unknown key.
 fn key(params: &[&[u16]], last: char) -> Option<Key> {
     let number = params[0][0];
     let key = match (last, number) {

@@ -176,8 +176,8 @@ fn replies_set_capabilities() {
         ..Capabilities::from_environment(Environment::default())
     };
     assert_eq!(capabilities, expected);
-    // Inside of tmux, tmux reports its version first and the terminal outside of tmux second. The
-    // second version decides if images can be placed by placeholders.
+    // Inside tmux, tmux reports its version first and the terminal outside tmux second. The second
+    // version decides if images can be placed by placeholders.
     let multiplexer = Some(Multiplexer::Tmux);
     for (version, expected) in [
         ("tmux 3.3a", false),

@@ -10,14 +10,15 @@ use crate::cells::palette_quantisation::{nearest_xterm, xterm_lightness, xterm_r
 
 /// Number of colours that are mixed for a pixel.
 const MIXED: usize = 4;
-/// Bayer's pattern: index of the colour, from dark to light, that the pixel at each position shows.
+/// Bayer's pattern, `[y][x]`: which of the mixed colours, ordered from dark to light, a pixel
+/// shows.
 const PATTERN: [[usize; 2]; 2] = [[0, 2], [3, 1]];
 /// Share, from 0 to 1, of the error so far that is added to the target before the next colour is
-/// chosen. A share of 1 reproduces the mean best, but mixes distant colours, which looks coarse in
-/// pixels as large as half a cell.
+/// chosen. A share of 1 reproduces the mean best, but mixes distant colours, which looks coarse
+/// because pixels are as large as half a cell.
 const STRENGTH: f32 = 0.5;
 
-/// Returns the index of one of xterm's 256 colours for each pixel.
+/// Returns the index in xterm's table of 256 colours for each pixel.
 pub fn dithered(raster: &Raster) -> Vec<u8> {
     let mut last = None;
     let mut mixed = [0; MIXED];

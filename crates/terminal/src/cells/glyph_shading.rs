@@ -1,4 +1,4 @@
-//! Picture cells in 16 colours, or without colours, with shading glyphs.
+//! Conversion of pictures to cells with shading glyphs, in 16 colours or without colours.
 
 use crate::cells::oklab::{Oklab, level, linear};
 use crate::cells::palette_quantisation::{QuantisedPalette, xterm_rgb};
@@ -21,14 +21,15 @@ const COVERAGE: [(char, f32); 9] = [
 ];
 /// Glyphs for mixtures of two colours.
 const SHADES: [char; 3] = ['░', '▒', '▓'];
-/// Background colours of mixtures, which leave the hue of the foreground unchanged.
+/// Backgrounds of mixtures: ANSI colours from black to white, which leave the hue unchanged.
 const NEUTRAL: [u8; 4] = [0, 7, 8, 15];
-/// Smallest decrease of the sum of both halves' OKLab errors for which a half block is preferred to
-/// a shading glyph. With 0, a cell of a changing picture would flicker between the two.
+/// Least fall of the OKLab errors, summed over both halves of a cell, for which a half block is
+/// preferred to a shading glyph. With 0, a cell of a changing picture would flicker between the
+/// two.
 const HALVES_GAIN: f32 = 0.05;
 
-/// Returns the share of the cell that `glyph` covers, 0..=1. Glyphs that are not in [`COVERAGE`],
-/// such as half blocks, have 0.5.
+/// Returns the share of the cell that `glyph` covers, 0..=1. It is 0.5 for glyphs that are not in
+/// [`COVERAGE`], such as half blocks.
 pub fn coverage(glyph: char) -> f32 {
     COVERAGE.iter().find(|(known, _)| *known == glyph).map_or(0.5, |(_, part)| *part)
 }
@@ -39,8 +40,7 @@ pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
     Oklab::of_linear([0, 1, 2].map(|c| coverage * fg[c] + (1.0 - coverage) * bg[c]))
 }
 
-/// Candidate cells in 16 colours: each colour alone, and each shading glyph in one colour on a
-/// neutral background.
+/// Cells for colours: each of 16 colours alone, and each shading glyph on a neutral background.
 static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     let mixed = NEUTRAL.into_iter().flat_map(|bg| (0..16).map(move |fg| (fg, bg)));
     let mixed = mixed.filter(|(fg, bg)| fg != bg).flat_map(|(fg, bg)| {
@@ -49,7 +49,7 @@ static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     (0..16).map(flat).chain(mixed).collect()
 });
 
-/// Mean colours of [`CELLS`].
+/// Mean colours of [`CELLS`], in the same order.
 static SHADED: LazyLock<QuantisedPalette> =
     LazyLock::new(|| QuantisedPalette::new(CELLS.iter().map(|cell| cell.halves()[0]).collect()));
 
@@ -72,7 +72,7 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let target = [upper, lower].map(Oklab::of);
     let [a, b] = [upper, lower].map(linear);
     let shade = SHADED.nearest([0, 1, 2].map(|c| level(0.5 * (a[c] + b[c]))));
-    // A half block would gain too little.
+    // The halves differ too little for a half block.
     if target[0].distance(target[1]) < HALVES_GAIN {
         return CELLS[shade];
     }

@@ -42,7 +42,7 @@ impl Colors {
     }
 }
 
-/// Image of square pixels, two of which a cell shows.
+/// Image of square pixels. A cell shows two of them, one above the other.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Raster {
     /// Pixels in a row, one per cell.
@@ -72,8 +72,8 @@ pub struct PictureCell {
 }
 
 impl PictureCell {
-    /// Returns the mean colours of the upper and the lower half, on a dark terminal with xterm's
-    /// colours.
+    /// Returns the mean colours of the upper and the lower half. Default colours are those of a
+    /// dark terminal; indexed colours are xterm's.
     pub fn halves(&self) -> [Oklab; 2] {
         let rgb = |color, plain| match color {
             Color::Rgb(r, g, b) => [r, g, b],
@@ -123,10 +123,10 @@ impl From<&Cell> for PictureCell {
     }
 }
 
-/// Converts `raster` to cells of a terminal with `colors`. In 256 colours only a settled picture is
-/// dithered, because a changing picture would flicker.
+/// Converts `raster` to cells of a terminal with `colors`. In 256 colours, the picture is dithered
+/// only if it is `settled`, because a changing picture would flicker.
 ///
-/// The last row of cells is half empty if the raster has an odd number of rows.
+/// If the raster has an odd number of rows, the lower halves of the last row of cells are empty.
 pub fn picture_cells(raster: &Raster, colors: Colors, settled: bool) -> Buffer {
     let dithered = (settled && colors == Colors::Indexed).then(|| dither::dithered(raster));
     let rgb = |pixel: usize| raster.pixels[pixel];
@@ -162,7 +162,7 @@ pub fn picture_cells(raster: &Raster, colors: Colors, settled: bool) -> Buffer {
     Buffer { area, content: content.collect() }
 }
 
-/// Copied for most cells, because setting a glyph or cloning a cell takes several times as long.
+/// Upper half block. Cells are copies of it, because setting a glyph takes several times as long.
 const UPPER_HALF: Cell = Cell::new("▀");
 
 /// Creates a cell from the colours of its halves. `lower` is `None` below the last row of pixels.

@@ -29,8 +29,7 @@ pub fn linear(rgb: [u8; 3]) -> [f32; 3] {
     rgb.map(|level| table[usize::from(level)])
 }
 
-/// Converts linear light, clamped to 0..=1, to the 8-bit sRGB level that is nearest in linear
-/// light.
+/// Returns the 8-bit sRGB level whose linear light is nearest to `linear`, clamped to 0..=1.
 pub fn level(linear: f32) -> u8 {
     let table = &*LINEAR;
     let above = table.partition_point(|l| *l < linear).min(255);
@@ -56,8 +55,8 @@ impl Oklab {
         }
     }
 
-    /// Returns the Euclidean distance: 1 between black and white; about 0.02 is just visible side
-    /// by side.
+    /// Returns the Euclidean distance. It is 1 between black and white; about 0.02 is just visible
+    /// side by side.
     pub fn distance(self, other: Self) -> f32 {
         self.distance_squared(other).sqrt()
     }

@@ -1,5 +1,6 @@
 //! Palette quantisation: a cached search for the nearest palette colour in OKLab, and xterm's table
-//! of 16 colours that users configure, a cube of 216 colours, and 24 greys.
+//! of 256 colours. The table has 16 colours that users configure, a cube of 216 colours, and 24
+//! greys.
 
 use crate::cells::oklab::Oklab;
 use std::sync::LazyLock;
@@ -23,7 +24,7 @@ impl QuantisedPalette {
         Self { colors, known: (0..1 << (3 * BITS)).map(|_| AtomicU16::new(0)).collect() }
     }
 
-    /// Returns the index of the palette colour nearest to the rounded `rgb`.
+    /// Returns the index of the palette colour that is nearest to `rgb` after rounding.
     pub fn nearest(&self, rgb: [u8; 3]) -> usize {
         let coarse = rgb.map(|c| usize::from(c) >> (8 - BITS));
         let known = &self.known[(coarse[0] << (2 * BITS)) | (coarse[1] << BITS) | coarse[2]];
@@ -39,7 +40,7 @@ impl QuantisedPalette {
         }
     }
 
-    /// Returns the index of the palette colour nearest to `target`, which is not rounded.
+    /// Returns the index of the palette colour that is nearest to `target`, without rounding.
     pub fn search(&self, target: Oklab) -> usize {
         let distances = self.colors.iter().map(|color| target.distance_squared(*color));
         distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
@@ -73,18 +74,18 @@ pub fn xterm_rgb(index: u8) -> [u8; 3] {
     }
 }
 
-/// Colours of the table from [`FIRST`] on.
+/// Colours of xterm's table from [`FIRST`] on.
 static XTERM: LazyLock<QuantisedPalette> = LazyLock::new(|| {
     QuantisedPalette::new((FIRST..=255).map(|index| Oklab::of(xterm_rgb(index))).collect())
 });
 
-/// Returns the index, 16..=255, of xterm's colour nearest to the 8-bit sRGB colour `rgb`, which is
-/// rounded first.
+/// Returns the index, 16..=255, of xterm's colour that is nearest to the 8-bit sRGB colour `rgb`
+/// after rounding.
 pub fn nearest_xterm(rgb: [u8; 3]) -> u8 {
     FIRST + XTERM.nearest(rgb) as u8
 }
 
-/// Returns the OKLab lightness, 0..=1, of colour `index` (16 to 255).
+/// Returns the OKLab lightness, 0..=1, of xterm's colour `index` (16 to 255).
 pub fn xterm_lightness(index: u8) -> f32 {
     XTERM.colors[usize::from(index.saturating_sub(FIRST))].l
 }

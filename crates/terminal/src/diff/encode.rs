@@ -50,7 +50,7 @@ impl Encoder {
         self.cursor = (width == 1 && x + 1 < self.columns).then_some((x + 1, y));
     }
 
-    /// Marks the position of the cursor as unknown, after other output.
+    /// Records that other output has moved the cursor to an unknown position.
     pub fn moved(&mut self) {
         self.cursor = None;
     }
@@ -126,7 +126,8 @@ impl Encoder {
             self.pen = Pen::default();
             codes.push("0".to_string());
         }
-        // Bit n of a modifier is the attribute that the SGR parameter n + 1 sets: bold, dim and so on.
+        // Bit n of a modifier stands for the attribute that SGR parameter n + 1 sets: bold, dim and
+        // so on.
         let missing = (pen.modifier - self.pen.modifier).iter();
         codes.extend(missing.map(|bit| (bit.bits().trailing_zeros() + 1).to_string()));
         for (new, old, base) in [(pen.fg, self.pen.fg, 30), (pen.bg, self.pen.bg, 40)] {

@@ -1,9 +1,9 @@
 //! Frame difference: selects the cells that the next frame sends to the terminal.
 //!
 //! Text is sent first, row by row. Cells of the picture with a visible difference follow, the
-//! largest first, within the byte budget of the frame. A new picture that does not fit is first
-//! sent as a mosaic of coarse blocks. While samples accumulate, a full comparison of all cells is
-//! due when the number of samples per pixel has grown by a factor of 2^(1/4), or, from 64 samples
+//! largest difference first, within the byte budget of the frame. A new picture that does not fit
+//! is first sent as a mosaic of coarse blocks. While samples accumulate, all cells are compared
+//! only when the number of samples per pixel has grown by a factor of 2^(1/4), or, from 64 samples
 //! on, of 2^(1/2). Invisible differences are sent when the connection is idle.
 
 mod encode;
@@ -34,7 +34,8 @@ pub struct TargetFrame<'a> {
     pub picture: Rect,
     /// Row-major mask of the picture's area: `false` if text covers a cell.
     pub uncovered: &'a [bool],
-    /// Number that increases when the picture shows something else; more samples do not count.
+    /// Number that increases when the picture shows something else, but not when it has more
+    /// samples.
     pub subject: u64,
     /// Number that increases when the picture may have changed for any reason.
     pub version: u64,
@@ -62,7 +63,7 @@ pub struct Pending {
     pub hidden: Option<Duration>,
 }
 
-/// Difference between the contents of the terminal, unknown by default, and a target frame.
+/// Difference between a target frame and the contents of the terminal, which are unknown at first.
 #[derive(Debug, Default)]
 pub struct FrameDiff {
     /// Contents of the terminal; an empty buffer if they are unknown.
@@ -73,8 +74,8 @@ pub struct FrameDiff {
     subject: Option<u64>,
     /// `true` until cells of a new picture have been sent, exactly or as a mosaic.
     fresh: bool,
-    /// Samples per pixel at which the next full comparison is due. Earlier comparisons consider
-    /// only cells that still differ visibly.
+    /// Samples per pixel from which on all cells are compared again. Until then, only cells that
+    /// still differ visibly are compared.
     next_samples: f64,
     version: u64,
     /// Time of the last change of `version`.
@@ -89,8 +90,8 @@ impl FrameDiff {
         self.encoder.moved();
     }
 
-    /// Appends the bytes of the next frame to `out`, within `allowance`; nothing if the terminal
-    /// shows `target` already. OKLab differences up to `threshold` are invisible.
+    /// Appends the bytes of the next frame to `out`, within `allowance`. Appends nothing if the
+    /// terminal shows `target` already. OKLab differences up to `threshold` are invisible.
     pub fn frame(
         &mut self,
         target: &TargetFrame,
@@ -245,8 +246,8 @@ impl FrameDiff {
         frame
     }
 
-    /// Encodes as many cells of `order`, pairs of difference and index, as fit into `room` bytes,
-    /// the largest differences first. `cell` returns the contents by index.
+    /// Encodes as many cells as fit into `room` bytes, the largest differences first. `order` has
+    /// the difference and index of each cell; `cell` returns the contents by index.
     fn fitting<'a>(
         &self,
         area: Rect,
@@ -270,8 +271,8 @@ impl FrameDiff {
         };
         let mut best = Part { bytes: Vec::new(), encoder: self.encoder.clone(), cells: Vec::new() };
         let mut count = order.len();
-        // The next count assumes equal bytes for every cell. Cells of a smaller selection are
-        // farther apart and need more bytes, so the count is rarely too low.
+        // The next count assumes equal bytes for every cell. It is rarely too low, because the
+        // cells of a smaller selection are farther apart and need more bytes each.
         while count > 0 {
             let part = encoded(count);
             if part.bytes.len() <= room {

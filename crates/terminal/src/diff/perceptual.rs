@@ -7,7 +7,7 @@ use ratatui::layout::Rect;
 use ratatui::style::Color;
 use std::collections::HashMap;
 
-/// Difference of a cell with unknown contents, larger than that between black and white.
+/// Difference that a cell with unknown contents has: more than that between black and white.
 const UNKNOWN: f32 = 2.0;
 
 /// Target and shown colours of one cell of the picture.
@@ -19,12 +19,11 @@ struct CellColors {
     halves: [Oklab; 2],
     /// Colours of the halves on the terminal; `None` if unknown.
     shown: Option<[Oklab; 2]>,
-    /// `true` if a difference may count as visible: from a full comparison on, until the cell is
-    /// sent exactly or the difference becomes invisible.
+    /// `true` if a difference may count as visible: from a comparison of all cells on, until the
+    /// cell is sent exactly or its difference is invisible.
     counts: bool,
     /// OKLab difference; 0 if the cells are equal.
     error: f32,
-    /// `true` if the difference is visible.
     visible: bool,
 }
 
@@ -53,8 +52,9 @@ impl PerceptualDiff {
         }
     }
 
-    /// Marks the cells whose difference is above `threshold`. If `is_due` is `true`, all cells are
-    /// considered, otherwise only the cells whose `counts` is `true`.
+    /// Compares the target with the contents `shown` of the terminal, and marks cells as visible
+    /// whose difference is above `threshold`. Unless `is_due`, only cells whose `counts` is `true`
+    /// are considered.
     pub fn compare(&mut self, target: &TargetFrame, shown: &Buffer, is_due: bool, threshold: f32) {
         for (index, cell_colors) in self.cells.iter_mut().enumerate() {
             let cell_position = position(self.area, index);
@@ -90,7 +90,7 @@ impl PerceptualDiff {
         }
     }
 
-    /// Records that the terminal shows `cell`, which equals the target if `exact` is `true`.
+    /// Records that the terminal shows `cell`, which is the target cell if `exact` is `true`.
     pub fn sent(&mut self, index: usize, cell: &Cell, exact: bool) {
         let cell_colors = &mut self.cells[index];
         let shown = PictureCell::from(cell).halves();
@@ -111,8 +111,9 @@ impl PerceptualDiff {
     }
 
     /// Creates a mosaic of the target in the cells with a visible difference: blocks of `side` x
-    /// `side` half cells in their mean colours, in linear light. `side` is even. Also returns `(gain, index)` of each cell that it brings closer to the
-    /// target, the decrease in OKLab distance.
+    /// `side` half cells (`side` is even) in their mean colours in linear light. Also returns
+    /// `(gain, index)` of each cell that the mosaic brings closer to the target; the gain is a fall
+    /// of OKLab distance.
     pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let block = |index: usize| (index % width / side, index / width / (side / 2));

@@ -87,7 +87,7 @@ impl Fixture {
         PICTURE.positions().filter(|at| self.is_exact(at.x, at.y)).count()
     }
 
-    /// Sends all remaining differences between the screen and the terminal.
+    /// Sends all differences that remain between the screen and the terminal.
     fn finish(&mut self) {
         self.settled = true;
         for i in 0..100 {

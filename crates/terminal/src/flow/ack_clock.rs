@@ -10,7 +10,7 @@ use std::time::Duration;
 /// first was delayed, the second alone would give too high a rate.
 const ACKS_TOGETHER: Duration = Duration::from_millis(20);
 
-/// Frames that the terminal acknowledges.
+/// Frames in flight, which the terminal acknowledges, and the last measurement of the rate.
 #[derive(Debug, Default)]
 pub(super) struct AckClock {
     /// Multiplexer through which requests and acknowledgements pass.
@@ -42,8 +42,8 @@ struct AckedFrame {
     at: Duration,
 }
 
-/// Measurement of the rate: a number of bytes, the time of the last acknowledgement, and bounds of
-/// the time at which a reply to the first byte could have arrived.
+/// Measurement of the rate: `bytes` bytes, the last of them acknowledged at the time `at`. A reply
+/// to the first byte could have arrived between `earliest_start` and `latest_start`.
 #[derive(Clone, Copy, Debug)]
 struct AckSample {
     earliest_start: Duration,

@@ -5,7 +5,7 @@ use crate::flow::{DEFAULT_RATE, PacingMode};
 use std::time::Duration;
 
 /// Shortest plausible round trip over SSH. A reply that comes sooner is from a multiplexer on this
-/// side.
+/// machine.
 const TOO_SOON: Duration = Duration::from_millis(3);
 
 /// State of the connection to the terminal before the first frame.
@@ -23,7 +23,7 @@ pub struct InitialLink {
 
 impl InitialLink {
     /// Derives the state. `queue` is `true` if the kernel reports the length of the TCP send queue.
-    /// `rate` is a fixed rate in bytes per second.
+    /// `rate` is the fixed rate in bytes per second, if one is wanted.
     pub fn of(terminal: &Capabilities, queue: bool, rate: Option<f64>) -> Self {
         let fallback = if queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
         let multiplexer = terminal.environment.multiplexer;

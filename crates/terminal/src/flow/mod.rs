@@ -34,19 +34,19 @@ const FRAME_SPAN: Duration = Duration::from_millis(100);
 const BUDGET: [f64; 2] = [2e3, 200e3];
 /// Assumed rate in bytes per second before the first measurement.
 const INITIAL_RATE: f64 = 80e3;
-/// Smallest assumed rate in bytes per second. At it a frame of the smallest budget takes one second;
-/// at a rate near 0, after a pause of the connection, the next frame would not be due for minutes.
+/// Smallest assumed rate in bytes per second, at which the smallest frame takes one second. Without
+/// it, the next frame after a pause of the connection would not be due for minutes.
 const MIN_RATE: f64 = 2e3;
 /// Largest number of frames in flight, that is, not acknowledged.
 const MAX_IN_FLIGHT: usize = 6;
-/// Largest sum of bytes of the frames in flight that contain only text.
+/// Largest number of bytes in flight in frames that contain only text.
 const MAX_TEXT: usize = 1500;
 /// Number of bytes below which the time of a frame is mostly latency: its acknowledgement may raise
 /// the measured rate, but not lower it.
 const SMALL: usize = 1000;
 /// Time after which a missing acknowledgement counts as lost.
 const LOST_AFTER: Duration = Duration::from_secs(3);
-/// Number of consecutive losses after which no acknowledgements are requested.
+/// Number of consecutive losses after which acknowledgements are no longer requested.
 const MAX_LOSSES: u32 = 3;
 /// Interval at which the shortest round trip is measured again.
 const ROUND_TRIP_INTERVAL: Duration = Duration::from_secs(30);
@@ -60,12 +60,12 @@ const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
 const STALLED_INTERVAL: Duration = Duration::from_millis(500);
 /// Assumed round trip before the first measurement.
 const DEFAULT_ROUND_TRIP: Duration = Duration::from_millis(100);
-/// Time after which the connection is silent, if bytes wait, none is transmitted, and no input
-/// arrives.
+/// Time after which the connection counts as silent, if bytes wait, none is transmitted, and no
+/// input arrives.
 const SILENT_AFTER: Duration = Duration::from_secs(30);
 /// Assumed rate of a connection that cannot be measured, in bytes per second.
 pub const DEFAULT_RATE: f64 = 30e3;
-/// Share of the rate that refinement may use: the sending of invisible differences.
+/// Share of the rate that refinement, the sending of invisible differences, may use.
 const REFINEMENT_SHARE: f64 = 0.25;
 
 /// Method that limits the rate of frames.
@@ -78,7 +78,6 @@ pub enum PacingMode {
     AckClocked(Option<Multiplexer>),
     /// The kernel reports the length of the TCP send queue.
     SendQueue,
-    /// Frames are sent at a fixed rate.
     FixedRate,
 }
 
@@ -118,12 +117,13 @@ impl Pacing {
 #[derive(Debug, Default)]
 pub struct FlowControl {
     pacing: Pacing,
-    /// Acknowledgements, suspended because the terminal did not reply, until a reply arrives.
+    /// Acknowledgements that are suspended because the terminal did not reply; a reply resumes
+    /// them.
     suspended: Option<AckClock>,
     start: InitialLink,
     /// Bytes per second, measured or fixed.
     rate: f64,
-    /// Shortest round trip since its latest measurement, at `round_trip_at`.
+    /// Shortest round trip since the latest measurement, which ended at the time `round_trip_at`.
     round_trip: Option<Duration>,
     round_trip_at: Duration,
     /// Time at which the last period of user activity began.
@@ -160,15 +160,15 @@ impl FlowControl {
     pub fn threshold(&self) -> f32 {
         match self.pacing {
             Pacing::Unlimited => 0.0,
-            // 10 Mbit/s and 300 kbit/s.
+            // The limits are 10 Mbit/s and 300 kbit/s.
             _ if self.rate > 1.25e6 => 0.01,
             _ if self.rate < 37.5e3 => 0.04,
             _ => 0.02,
         }
     }
 
-    /// Records user input. For `ACTIVE_TIME` the round trip is then measured only if the rate is
-    /// doubtful.
+    /// Records user input. For `ACTIVE_TIME` from then on, the round trip is measured only if the
+    /// rate is doubtful.
     pub fn record_input(&mut self, now: Duration) {
         if now >= self.active_until {
             self.active_since = now;
@@ -188,8 +188,8 @@ impl FlowControl {
         self.measures_at(now).is_some_and(|at| at <= now)
     }
 
-    /// Returns the time of the next measurement of the send queue; `None` if it is empty or does
-    /// not limit the frames.
+    /// Returns the time of the next measurement of the send queue. Returns `None` if the queue is
+    /// empty, or frames are not limited by it.
     pub fn measures_at(&self, now: Duration) -> Option<Duration> {
         let Pacing::SendQueue(queue) = &self.pacing else { return None };
         let is_stalled = queue.stalled_since().is_some_and(|at| at + LOST_AFTER <= now);
@@ -209,7 +209,8 @@ impl FlowControl {
     }
 
     /// Returns the limits of a frame that may be sent now; `None` if none may be sent. `answers` is
-    /// `true` if the frame shows the effect of user input: it need not keep the usual interval.
+    /// `true` if the frame shows the effect of user input; such a frame need not keep the usual
+    /// interval.
     pub fn allowance(&self, now: Duration, answers: bool) -> Option<FrameBudget> {
         // The round trip is measured by a small frame.
         let bytes = if self.needs_round_trip(now) { SMALL } else { self.budget() };
@@ -267,8 +268,8 @@ impl FlowControl {
         }
     }
 
-    /// Records bytes that end inside an escape sequence, where no request can be inserted. The time
-    /// of their transmission is estimated.
+    /// Records sent bytes that end inside an escape sequence, where no acknowledgement can be
+    /// requested. The time of their transmission is estimated.
     pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
         if let Pacing::AckClocked(_) = self.pacing {
             self.last_frame = Some(now);
@@ -279,8 +280,8 @@ impl FlowControl {
         }
     }
 
-    /// Records a reply, which acknowledges the oldest frame in flight or resumes suspended
-    /// acknowledgements. Returns `false` if there was neither.
+    /// Records a status reply, which acknowledges the oldest frame in flight or resumes suspended
+    /// acknowledgements. Returns `false` if there was nothing to acknowledge or resume.
     pub fn on_ack(&mut self, at: Duration) -> bool {
         if let Some(clock) = self.suspended.take() {
             self.pacing = Pacing::AckClocked(clock.resumed());
@@ -303,7 +304,7 @@ impl FlowControl {
         true
     }
 
-    /// Includes `rate`, just measured, in the average.
+    /// Includes a newly measured rate in the moving average.
     fn average_rate(&mut self, rate: f64) {
         let average = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
         self.rate = average.max(MIN_RATE);
@@ -392,7 +393,7 @@ impl FlowControl {
             Pacing::SendQueue(queue) if self.needs_round_trip(now) => queue.bytes == 0.0,
             Pacing::SendQueue(queue) => {
                 let extra = if is_first(self.last_frame) { self.budget() as f64 } else { 0.0 };
-                // With a shorter queue, the effect of an input waits for fewer bytes.
+                // With a shorter queue, the effect of user input waits for fewer bytes.
                 let spare = if is_active { self.budget() as f64 / 2.0 } else { 0.0 };
                 queue.bytes < self.max_queue() + extra - spare
             }
@@ -403,8 +404,8 @@ impl FlowControl {
         }
     }
 
-    /// Returns the number of bytes in the send queue above which no frame is sent: the bytes that
-    /// are transmitted in one round trip and [`FRAME_SPAN`].
+    /// Returns the number of bytes in the send queue above which no frame is sent: those that the
+    /// connection transmits in one round trip plus [`FRAME_SPAN`].
     fn max_queue(&self) -> f64 {
         let time = self.round_trip.unwrap_or(DEFAULT_ROUND_TRIP) + FRAME_SPAN;
         (self.rate * time.as_secs_f64()).max(BUDGET[0])
@@ -417,8 +418,8 @@ impl FlowControl {
         (1 + round_trips.round() as usize).clamp(2, MAX_IN_FLIGHT)
     }
 
-    /// Returns `true` if the next frame should measure the round trip: the last measurement is
-    /// missing or old and the user inactive, or the rate of the send queue is doubtful.
+    /// Returns `true` if the next frame should measure the round trip: if the last measurement is
+    /// missing or old and the user is inactive, or if the rate of the send queue is doubtful.
     fn needs_round_trip(&self, now: Duration) -> bool {
         let is_known = self.round_trip.is_some() && now < self.round_trip_at + ROUND_TRIP_INTERVAL;
         let is_due = !is_known && now >= self.active_until;
@@ -429,7 +430,7 @@ impl FlowControl {
         }
     }
 
-    /// Changes to `mode`, which requests no acknowledgements, until a late one arrives.
+    /// Changes to `mode`, which requests no acknowledgements. A late acknowledgement changes back.
     fn fall_back(&mut self, mode: PacingMode, now: Duration) {
         let before = std::mem::replace(&mut self.pacing, Pacing::start(mode));
         if let Pacing::AckClocked(clock) = before {

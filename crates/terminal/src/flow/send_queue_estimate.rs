@@ -3,10 +3,10 @@
 
 use std::time::Duration;
 
-/// Time after a frame was sent in which its bytes may not have reached the queue, because another
-/// process, such as `sshd`, passes them on.
+/// Time after a frame was sent in which its bytes may not have reached the queue yet, because
+/// another process, such as `sshd`, passes them on.
 const SETTLING: Duration = Duration::from_millis(10);
-/// Time from the start of a busy period in which measurements do not count, if the round trip is
+/// Time from the start of a busy period in which measurements do not count if the round trip is
 /// unknown.
 const BELIEVED_AFTER: Duration = Duration::from_millis(50);
 /// Shortest time over which the rate is measured.
@@ -17,19 +17,18 @@ const SAMPLE: Duration = Duration::from_millis(100);
 pub struct SendQueueEstimate {
     /// Estimated bytes in the queue: the last measurement plus the bytes sent since.
     pub bytes: f64,
-    /// Time of the last measurement.
     pub measured_at: Option<Duration>,
     /// Bytes sent in total.
     sent: f64,
     /// Time at which the last frame was sent.
     sent_at: Duration,
     busy: Option<Busy>,
-    /// Beginning of a measurement of the rate that was shorter than [`SAMPLE`]. The next busy period
-    /// may continue it.
+    /// Beginning of a measurement that was too short for a rate. The next busy period may continue
+    /// it.
     short_sample: Option<SampleStart>,
-    /// Half of the rate at the last measurement of the round trip. A lower rate causes a new
-    /// measurement: a longer round trip may have lowered the rate, because the limit of the queue is
-    /// derived from the round trip.
+    /// Half of the rate when the round trip was last measured. If the rate falls below it, the
+    /// round trip is measured again. It may have become longer, and the limit of the queue follows
+    /// from it.
     pub doubtful_rate: f64,
 }
 
@@ -50,12 +49,12 @@ impl SampleStart {
     }
 }
 
-/// Time in which the queue is not empty.
+/// Busy period, in which the queue is not empty.
 #[derive(Debug)]
 struct Busy {
     since: Duration,
-    /// Beginning of the measurement over the whole period. It includes the previous period if that
-    /// was too short and began less than [`SAMPLE`] before this one.
+    /// Beginning of the measurement over the whole period. The measurement continues that of the
+    /// previous period if that was too short and began less than [`SAMPLE`] before this period.
     whole: SampleStart,
     /// Bytes of the only frame of the period; `None` for several.
     alone: Option<usize>,
@@ -77,7 +76,7 @@ pub struct QueueSample {
     pub alone: Option<LoneFrame>,
     /// Bytes per second that left the queue.
     pub rate: Option<f64>,
-    /// `true` if `rate` is the rate of the connection; if `false`, the connection may be faster.
+    /// `true` if `rate` is the rate of the connection. If `false`, the connection may be faster.
     pub is_full: bool,
 }
 
@@ -157,7 +156,7 @@ impl SendQueueEstimate {
             busy.most_drained = drained;
         }
         busy.is_full |= self.bytes >= limit;
-        // Pauses lower the rate over the whole period but cannot raise it. In a short period, a
+        // Pauses can lower the rate over the whole period, but not raise it. In a short period, a
         // relay or the buffers of the other host may have taken the bytes at once.
         let whole = busy.whole.rate(now, drained);
         if bytes == 0 {

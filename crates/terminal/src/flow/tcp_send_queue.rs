@@ -25,7 +25,7 @@ impl TcpSendQueue {
         tables.into_iter().find_map(|path| self.bytes_in(&fs::read_to_string(path).ok()?))
     }
 
-    /// Parses `client-address client-port server-address server-port`.
+    /// Parses the value of `SSH_CONNECTION`: address and port of the client, then of the server.
     fn parse(text: &str) -> Option<Self> {
         let fields: Vec<_> = text.split_whitespace().collect();
         let [client, client_port, server, server_port] = fields[..] else { return None };

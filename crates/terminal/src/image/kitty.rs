@@ -6,17 +6,17 @@ use base64::engine::general_purpose::STANDARD;
 use crossterm::cursor::MoveTo;
 use ratatui::layout::Rect;
 
-/// Base64 characters in a chunk, a multiple of 4, at most 4096. A chunk of 1024 fits into the
-/// smallest budget of a frame.
+/// Base64 characters in a chunk. The protocol permits multiples of 4 up to 4096. A chunk of 1024
+/// fits into the smallest budget of a frame.
 const CHUNK: usize = 1024;
 
-/// Number of the image, below 256, because placeholders encode it as an indexed colour.
+/// Number of the image. It is below 256, because placeholders encode it as an indexed colour.
 pub const IMAGE: u8 = 163;
 
 /// Character in place of which the terminal shows a part of an image.
 const PLACEHOLDER: char = '\u{10eeee}';
 
-/// Combining marks that encode the row of a placeholder: the beginning of the protocol's table.
+/// Combining marks that encode the row of a placeholder: the first ones of the protocol's table.
 const MARKS: [u32; 88] = [
     0x305, 0x30d, 0x30e, 0x310, 0x312, 0x33d, 0x33e, 0x33f, 0x346, 0x34a, 0x34b, 0x34c, 0x350,
     0x351, 0x352, 0x357, 0x35b, 0x363, 0x364, 0x365, 0x366, 0x367, 0x368, 0x369, 0x36a, 0x36b,
@@ -37,8 +37,8 @@ pub fn placeholder(row: u16) -> String {
     [Some(PLACEHOLDER), mark].into_iter().flatten().collect()
 }
 
-/// Returns the bytes that show the file `png` in the cells `place`: inside tmux, by placeholders.
-/// If `stretched` or `through_tmux` is `true`, the terminal scales the image to these cells.
+/// Returns the bytes that show the file `png` in the cells `place`. Inside tmux, these cells must
+/// hold placeholders. If `stretched` or `through_tmux`, the terminal scales the image to the cells.
 pub fn transfer(png: &[u8], place: Rect, stretched: bool, through_tmux: bool) -> Transfer {
     let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
     let letters = STANDARD.encode(png);

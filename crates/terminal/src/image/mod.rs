@@ -1,7 +1,7 @@
 //! Images, encoded by kitty's protocol, by sixel, or as half blocks.
 //!
 //! An image is sent in slices within the byte budget of a frame, because a transfer can take
-//! seconds and a key must take effect in tenths of a second. Existing widgets send an image as a
+//! seconds and a key must take effect in tenths of a second. Widgets of other crates send it as a
 //! whole.
 
 mod kitty;
@@ -15,7 +15,7 @@ pub use transfer::Transfer;
 
 /// Largest width and height of a sixel image if the terminal reports no limit: the limit of xterm.
 const SIXEL_PX: usize = 1000;
-/// Assumed width and height of a cell.
+/// Assumed width and height of a cell in pixels, if the terminal does not report them.
 const CELL_PX: [u16; 2] = [8, 16];
 /// Estimated bytes per pixel of an encoded image, by which it is scaled down to its byte limit.
 const BYTES_PER_PIXEL: f64 = 1.6;
@@ -23,13 +23,12 @@ const BYTES_PER_PIXEL: f64 = 1.6;
 /// Protocol by which images are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Protocol {
-    /// Kitty's graphics protocol.
     Kitty,
     /// Kitty's graphics protocol with Unicode placeholders, through tmux.
     KittyThroughTmux,
     /// Sixel with this number of colours.
     Sixel(u16),
-    /// No image protocol.
+    /// Half blocks, without an image protocol.
     Blocks,
 }
 

@@ -10,7 +10,7 @@ use ratatui::layout::Rect;
 const MAX_STRIPS: u16 = 16;
 
 /// Returns the bytes that show `image` at `place` in strips of one or more rows of cells, each with
-/// at most `colors` colours. Other output can be sent between strips.
+/// at most `colors` colours. `cell_height` is in pixels. Other output can be sent between strips.
 ///
 /// # Errors
 /// Fails if the image is empty.

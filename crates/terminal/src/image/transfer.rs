@@ -10,8 +10,8 @@ pub struct Transfer {
     /// Offsets between escape sequences, ascending, at which other output may be sent. The last is
     /// the length of `bytes`.
     pub stops: Vec<usize>,
-    /// `true` for sixel: sequences may be divided at any byte and ended early by ST (string
-    /// terminator), and the image overwrites its cells, which must be drawn again after its removal.
+    /// `true` for sixel. Its sequences may be divided at any byte and ended early by ST (string
+    /// terminator). The image overwrites its cells, which must be drawn again after its removal.
     pub is_sixel: bool,
     /// Bytes that remove the image, even if only a part of it was sent.
     pub remove: Vec<u8>,
