@@ -9,28 +9,28 @@ use zerkalo_render::SyncRender;
 /// Point of an error curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Number of calls of [`SyncRender::step`] before this point.
+    /// Number of calls of [`SyncRender::step`] up to this point.
     pub step: usize,
-    /// Number of samples until this point, over all pixels.
+    /// Number of samples up to this point, over all pixels.
     pub samples: u64,
     /// Mean number of samples per pixel.
     pub spp: f64,
-    /// Seconds of tracing until this point, in each repetition.
+    /// Seconds of tracing up to this point, in each repetition.
     pub seconds: Vec<f64>,
-    /// Error in 8-bit levels that the render estimates from its replicates. `None` before the first
-    /// estimate.
+    /// Error in 8-bit levels as the render estimates it from its replicates. `None` before the
+    /// first estimate.
     pub estimated_levels: Option<f64>,
     pub errors: Errors,
 }
 
-/// Ratio of the estimated errors of consecutive points: about 2^(-1/4), so that a curve has four
-/// points for each halving of the error.
+/// Ratio to which the estimated error falls from one point to the next: about 2^(-1/4), so that a
+/// curve has four points for each halving of the error.
 const POINT_RATIO: f64 = 0.84;
 
-/// Renders with the settings of `variant` until the error is at most `levels` 8-bit levels, `seconds`
-/// of tracing have passed, or further samples cannot change the picture. The error is the estimated
-/// one for biased settings, whose true error does not converge to 0. Returns the error curve and the
-/// render, or the error of the system if a thread cannot be started.
+/// Renders with the settings of `variant`. Ends when the error is at most `levels` 8-bit levels,
+/// `seconds` of tracing have passed, or further samples cannot change the picture. For biased
+/// settings, whose true error does not converge to 0, the error is the estimated one. Returns the
+/// error curve and the render. Fails if a thread cannot be started.
 pub fn follow(
     variant: &Variant,
     reference: &Reference,

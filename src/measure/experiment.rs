@@ -1,4 +1,4 @@
-//! Experiments: settings that trade speed for accuracy are varied one at a time.
+//! Experiments: each varies one setting that trades speed for accuracy.
 
 use std::io;
 use std::sync::Arc;
@@ -19,13 +19,13 @@ pub struct Experiment {
     pub title: &'static str,
     /// `true` if the pictures of all variants differ in noise only.
     pub is_unbiased: bool,
-    /// Returns the variants of a render with default settings, except those that would equal it.
+    /// Function that returns the variants of the default settings, without any that equal them.
     vary: Vary,
 }
 
 type Vary = fn(&Variant) -> Vec<Variant>;
 
-/// Default settings, an experiment without variants.
+/// Default settings, as an experiment without variants.
 pub static DEFAULT: Experiment = unbiased("default", "Default settings", |_| Vec::new());
 
 pub static EXPERIMENTS: [Experiment; 10] = [
@@ -59,7 +59,7 @@ impl PartialEq for Experiment {
     }
 }
 
-/// Returns the variant with the precision that `auto` does not choose for the scene.
+/// Returns the variant in the precision that `auto` does not choose for the scene.
 fn other_precision(base: &Variant) -> Vec<Variant> {
     let (name, precision) = match AnyWorld::compile(&base.scene, &base.options.world) {
         AnyWorld::Single(_) => ("double", Precision::Double),
@@ -87,7 +87,7 @@ fn other_accelerations(base: &Variant) -> Vec<Variant> {
 }
 
 /// Returns a variant whose cone lobes are replaced by square lobes, their cheap approximation, and
-/// a variant with the reverse. Each exists only if the scene has glossy lobes to replace.
+/// a variant with the opposite replacement. Each exists only if the scene has such glossy lobes.
 fn other_lobes(base: &Variant) -> Vec<Variant> {
     let exchanges = [
         (Lobe::Cone, Lobe::Square, "square for cone"),
@@ -152,8 +152,8 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Creates a render of this variant that ends by itself only when every tile has its largest
-    /// number of samples. Returns the error of the system if a thread cannot be started.
+    /// Starts the render of this variant. It ends by itself only when every tile has its largest
+    /// number of samples. Fails if a thread cannot be started.
     pub fn start(&self) -> io::Result<SyncRender> {
         let settings = Settings::new(self.adaptive, Stop::default());
         SyncRender::new(&self.scene, &self.options, settings, self.threads)
@@ -172,14 +172,14 @@ impl Variant {
     }
 }
 
-/// Plan of a measurement.
+/// Noise targets, experiments and duration of a measurement.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
     pub targets: Vec<f64>,
     pub experiments: Vec<&'static Experiment>,
     /// Smallest number of timed renders of each variant, at least 1.
     pub repetitions: usize,
-    /// Approximate duration of all measurements, in seconds.
+    /// Approximate duration of the whole measurement, in seconds.
     pub seconds: f64,
     /// Number of tracing threads, except in the experiment `threads`.
     pub threads: usize,

@@ -2,8 +2,8 @@
 //! to a given noise, cost and bias of each setting.
 //!
 //! Errors are exactly reproducible, because the random seed is fixed. Seconds are medians of
-//! repetitions. The repetitions of all settings are interleaved, so that a slow moment of the
-//! machine affects all of them alike.
+//! repetitions. The repetitions of all settings take turns, so that a slow moment of the machine
+//! affects all settings alike.
 
 #![allow(missing_docs, reason = "fields and functions whose names say it")]
 

@@ -11,8 +11,8 @@ use plotters::style::{FontStyle, register_font};
 use std::error::Error;
 use std::ops::Range;
 
-/// Font of the text in plots, so that plots are the same on every machine. It is Ubuntu Light,
-/// reduced to Latin, Greek and Cyrillic letters, figures and signs, without hinting.
+/// Font of plots, which are therefore the same on every machine. It is Ubuntu Light, reduced to
+/// Latin, Greek and Cyrillic letters, figures and signs, without hinting.
 const FONT: &[u8] = include_bytes!("font/light.ttf");
 
 /// Width and height of a panel of the plot, in pixels.
@@ -47,8 +47,8 @@ pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Err
     Ok(text)
 }
 
-/// Returns the experiments with their variants, each of which has a panel that also shows the
-/// default settings. They have a panel of their own only if there are no experiments.
+/// Returns the panels of the plot: each experiment with its variants. Every panel also shows the
+/// default settings, which have a panel of their own only if there are no experiments.
 fn panels(measurement: &Measurement) -> Vec<(&'static Experiment, &[Measured])> {
     let changed = &measurement.measured[1..];
     let panels = changed.chunk_by(|a, b| a.variant.experiment == b.variant.experiment);
@@ -82,7 +82,7 @@ fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
 }
 
 /// Returns the tick marks of a logarithmic axis: 1, 2 and 5 times each power of ten, or only the
-/// powers of ten if there are more than nine of these. `plotters` marks only powers of ten.
+/// powers of ten if that makes more than nine. `plotters` itself marks only powers of ten.
 fn ticks(range: &Range<f64>) -> Vec<f64> {
     let powers = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
     let multiples = |steps: &[f64]| -> Vec<f64> {

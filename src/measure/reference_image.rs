@@ -15,13 +15,13 @@ pub struct Reference {
     /// Half the difference between the replicates in each pixel, in 8-bit levels. Empty if the
     /// reference counts as exact.
     halves: Vec<[f64; 3]>,
-    /// Errors of the reference itself; 0 if it counts as exact.
+    /// Estimated errors of the reference itself; 0 if it counts as exact.
     own: Squares,
     display: Display,
 }
 
-/// Mean squared errors over pixels and channels, in linear radiance and in 8-bit levels. `mean` is
-/// the variance of the mean linear radiance of all pixels and channels.
+/// Mean squared errors over pixels and channels: `linear` in linear radiance, `levels` in 8-bit
+/// levels. `mean` is the variance of the mean linear radiance over all pixels and channels.
 #[derive(Clone, Copy, Debug, Default)]
 struct Squares {
     linear: f64,
@@ -36,20 +36,20 @@ pub struct Errors {
     pub rmse_linear: f64,
     /// RMSE of the displayed picture, in unrounded 8-bit levels.
     pub rmse_levels: f64,
-    /// Relative standard deviation of `rmse_levels`, 0..=1, if the reference were rendered again
-    /// with other seeds.
+    /// Relative standard deviation of `rmse_levels`, 0..=1, between references rendered with
+    /// different seeds.
     pub spread: f64,
 }
 
-/// Difference between the expectation of a picture and that of the reference.
+/// Estimated bias: the difference between the expectations of a picture and of the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bias {
     /// Difference between the mean radiances of the two pictures, divided by its standard error.
     pub z: f64,
-    /// RMS difference between the pixels in 8-bit levels, without the noise of both pictures, whose
-    /// mean squares are subtracted from the mean squared difference.
+    /// RMS difference between the pixels, in 8-bit levels, after the mean squared noise of both
+    /// pictures is subtracted from the mean squared difference.
     pub levels: f64,
-    /// Smallest significant value of [`Self::levels`]: its square is two standard errors of the
+    /// Smallest significant value of [`Self::levels`]. Its square is two standard errors of the
     /// mean squared difference.
     pub least_levels: f64,
 }
@@ -110,7 +110,7 @@ impl Reference {
         Self { own, halves, ..Self::of_pixels(pixels, display) }
     }
 
-    /// Creates an exact reference.
+    /// Creates a reference that counts as exact.
     pub fn of_pixels(pixels: Vec<[f64; 3]>, display: &Display) -> Self {
         let levels = pixels.iter().map(|x| display.levels(*x)).collect();
         let own = Squares::default();
@@ -118,7 +118,7 @@ impl Reference {
         Self { spp: 0.0, seconds: 0.0, pixels, levels, halves, own, display: *display }
     }
 
-    /// Returns the RMSE of the reference itself, estimated from its replicates, in 8-bit levels.
+    /// Returns the RMSE of the reference itself in 8-bit levels, estimated from its replicates.
     pub fn noise_levels(&self) -> f64 {
         self.own.levels.sqrt()
     }
@@ -128,8 +128,8 @@ impl Reference {
         self.own.linear.sqrt()
     }
 
-    /// Returns the errors of `film`: the roots of its mean squared differences from the reference,
-    /// less the mean squared error of the reference itself.
+    /// Returns the errors of `film`. The mean squared error of the reference itself is subtracted
+    /// from the mean squared difference before the root is taken.
     pub fn errors(&self, film: &Film, weights: &LightWeights) -> Errors {
         self.errors_of(&pixels(film, Replicates::Both, weights))
     }
@@ -157,7 +157,7 @@ impl Reference {
         }
     }
 
-    /// Returns the bias of `film` and its significance.
+    /// Returns the estimated bias of `film`.
     pub fn bias(&self, film: &Film, weights: &LightWeights) -> Bias {
         let [a, b] = [Replicates::A, Replicates::B].map(|r| pixels(film, r, weights));
         let own = own_error(&a, &b, &self.display);

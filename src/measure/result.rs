@@ -43,7 +43,7 @@ pub struct Measured {
     pub variant: Variant,
     /// Error curve, in ascending order of sample count.
     pub points: Vec<Point>,
-    /// Bias at the end of the error curve. `None` for experiments that are unbiased.
+    /// Bias at the end of the error curve. `None` for unbiased experiments.
     pub bias: Option<Bias>,
 }
 
@@ -57,7 +57,7 @@ pub struct Measurement {
     pub compared_at: f64,
     /// Noise targets in 8-bit levels, in descending order.
     pub targets: Vec<f64>,
-    /// Noise targets that the default settings did not reach in time.
+    /// Extrapolated times to the noise targets that the default settings did not reach.
     pub expected: Vec<Expected>,
     /// Experiments without a variant that differs from the default settings in this scene.
     pub idle: Vec<&'static Experiment>,
@@ -65,13 +65,13 @@ pub struct Measurement {
     pub measured: Vec<Measured>,
 }
 
-/// Largest relative uncertainty that the error of the reference may cause in a measured error.
-/// Points with a larger uncertainty are ignored.
+/// Largest relative uncertainty of a measured error, caused by the error of the reference. Points
+/// with a larger uncertainty are ignored.
 const MAX_SPREAD: f64 = 0.05;
 
-/// Half-width of the confidence interval of a median by the sign test, in standard deviations of
-/// the rank. One standard deviation is sqrt(n) / 2 ranks. The factor 1.4 covers 84 %; sqrt 2 widens
-/// the interval to that of the difference of two medians.
+/// Half-width of the confidence interval of a median of n values by the sign test, in standard
+/// deviations of the rank. One standard deviation is sqrt(n) / 2 ranks. The factor 1.4 covers 84 %;
+/// sqrt 2 widens the interval to that of the difference of two medians.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
 /// Returns the median of `values`, or NaN if there are none.
@@ -115,8 +115,8 @@ impl Measured {
         })
     }
 
-    /// Returns the time at which the error fell to `levels` 8-bit levels: the render's own estimate
-    /// for biased variants, whose true error does not converge to 0, and the true error otherwise.
+    /// Returns the time at which the error fell to `levels` 8-bit levels. For biased variants,
+    /// whose true error does not converge to 0, it is the error that the render estimates.
     pub fn true_time_to(&self, levels: f64) -> Option<TimeToTarget> {
         match self.bias {
             Some(_) => {
@@ -126,8 +126,8 @@ impl Measured {
         }
     }
 
-    /// Returns the time at which `error` fell to `levels`, interpolated in log-log coordinates. It is
-    /// that of the first point if its error is smaller already: there is no earlier picture.
+    /// Returns the time at which `error` fell to `levels`, interpolated in log-log coordinates. If
+    /// the first point is below `levels` already, returns its time.
     fn interpolated_time(
         &self,
         levels: f64,
@@ -137,7 +137,7 @@ impl Measured {
         let to = &self.points[after];
         let from = after.checked_sub(1).map(|i| &self.points[i]);
         let (weight, from) = match from {
-            // The interpolation needs the logarithms of both errors.
+            // The interpolation takes the logarithms of both errors.
             Some(from) if error(to) > 0.0 && error(from).is_finite() => {
                 ((error(from) / levels).ln() / (error(from) / error(to)).ln(), from)
             }
@@ -162,8 +162,8 @@ impl Measured {
         Some(Median { value: median(&speeds), spread: spread(&speeds) })
     }
 
-    /// Returns the order of convergence of the linear RMSE, without the first quarter of the
-    /// points, which has too few samples for a power law. Returns `None` if too few points remain.
+    /// Returns the order of convergence of the linear RMSE. The first quarter of the points is left
+    /// out, because so few samples follow no power law. Returns `None` if too few points remain.
     pub fn slope(&self) -> Option<Slope> {
         let from = self.points.len() / 4;
         let points: Vec<_> =
@@ -178,7 +178,7 @@ impl Measurement {
         &self.measured[0]
     }
 
-    /// Returns the smallest number of renders of which a reported time is the median.
+    /// Returns the smallest number of renders over which a reported median was taken.
     pub fn repetitions(&self) -> usize {
         let points = self.measured.iter().filter_map(|measured| measured.points.first());
         points.map(|point| point.seconds.len()).min().unwrap_or(0)

@@ -12,15 +12,15 @@ use zerkalo_render::SyncRender;
 use zerkalo_render::schedule::Interval;
 use zerkalo_scene::Scene;
 
-/// Observer of a measurement. It gets the render in progress, which is `reference` or the name of a
-/// variant, and the numbers of renders that have ended and that are expected. If it returns `false`,
-/// the measurement ends with the results so far.
+/// Observer of a measurement. It gets the name of the render in progress (a variant, or
+/// `reference`), the number of renders that have ended, and the number that is expected. If it
+/// returns `false`, the measurement ends with the results so far.
 pub type Observer<'a> = &'a mut dyn FnMut(&str, usize, usize) -> bool;
 
 /// Seconds of tracing before the measurement, until clock rates and caches are steady.
 const WARM_UP_SECONDS: f64 = 0.3;
-/// Noise of the reference, as a share of the smallest noise to be measured (a target or
-/// [`COMPARED_AT`]): its squared error is 9 % of that noise squared.
+/// Noise of the reference, as a share of the smallest noise to be measured, which is a target or
+/// [`COMPARED_AT`]. The squared error of the reference is then 9 % of that noise squared.
 const REFERENCE_SHARE: f64 = 0.3;
 /// Largest duration of the reference, as a share of the whole measurement.
 const REFERENCE_TIME: f64 = 0.3;
@@ -28,15 +28,15 @@ const REFERENCE_TIME: f64 = 0.3;
 const DEFAULT_TIME: f64 = 0.12;
 /// Smallest noise at which settings are compared, in 8-bit levels.
 const COMPARED_AT: f64 = 0.5;
-/// Longest duration of a render with a changed setting, in units of the time in which the default
-/// settings reach the noise at which settings are compared.
+/// Longest duration of a render with a changed setting, in units of the time that the default
+/// settings take to reach the noise at which settings are compared.
 const MAX_SLOWDOWN: f64 = 5.0;
 /// Largest number of rounds, unless the plan requests more. A round repeats the render of each
 /// variant once.
 const MAX_ROUNDS: usize = 15;
 
-/// Measures `scene`, which must be valid. Without a `reference`, one is rendered with another
-/// random seed. Returns the error of the system if a thread cannot be started.
+/// Measures `scene`, which must be valid. If no `reference` is given, one is rendered with another
+/// random seed. Fails if a thread cannot be started.
 pub fn measure(
     scene: &Arc<Scene>,
     plan: &Plan,
