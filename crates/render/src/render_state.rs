@@ -131,7 +131,6 @@ impl RenderState {
         &self.scene
     }
 
-    /// Returns the name of each light group.
     pub fn group_names(&self) -> Vec<String> {
         self.world.info().groups.names(&self.scene)
     }

@@ -24,9 +24,7 @@ impl LightWeights {
 pub enum Replicates {
     /// Both: their mean is the picture.
     Both,
-    /// Replicate A alone.
     A,
-    /// Replicate B alone.
     B,
 }
 

@@ -43,7 +43,6 @@ impl Header {
 /// pixel in a light group is its sum divided by the group's scale and by the number of samples.
 #[derive(Debug)]
 pub struct Film {
-    /// Properties of the film.
     pub header: Header,
     /// Row of the picture in which the film begins, a multiple of [`TILE`].
     pub first_row: usize,

@@ -10,10 +10,8 @@ use zerkalo_scene::disk::{Existing, Replacement, WriteError, replace_file};
 /// Number of bits per channel of a PNG file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Depth {
-    /// 8 bits per channel: 256 levels.
     #[default]
     Eight,
-    /// 16 bits per channel: 65 536 levels.
     Sixteen,
 }
 

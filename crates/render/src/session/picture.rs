@@ -10,7 +10,6 @@ use zerkalo_scene::Scene;
 
 /// Film of a session with its report.
 pub struct Picture<'a> {
-    /// Film with the samples so far.
     pub film: &'a Film,
     /// Weight of each light group in the picture.
     pub weights: &'a LightWeights,

@@ -22,10 +22,8 @@ pub enum State {
 /// Progress of the render of one scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
-    /// Generation of the scene.
     pub generation: u64,
     pub state: State,
-    /// Samples per pixel.
     pub spp: Spp,
     /// Number of samples over all pixels and both replicates.
     pub samples: u64,

@@ -35,7 +35,6 @@ pub struct WatchReport {
     pub target_levels: Option<f64>,
     /// Width and height of the picture in pixels. `None` if they are unknown.
     pub size: Option<[u32; 2]>,
-    /// Display transform of the picture.
     pub display: Display,
     /// Path of the scene file; empty if it is unknown.
     pub source: String,
