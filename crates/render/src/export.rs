@@ -69,7 +69,7 @@ pub fn metadata(
     entries.map(|(key, value)| (key.to_string(), value)).collect()
 }
 
-/// Formats the value of the metadata entry `SETTINGS`.
+/// Formats the value of the metadata entry `Settings`.
 pub fn settings_text(sampler: &str, precision: &str, adaptive: bool, display: &Display) -> String {
     let allocation = if adaptive { "adaptive" } else { "uniform" };
     let display = display_text(display);

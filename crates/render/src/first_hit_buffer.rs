@@ -19,7 +19,8 @@ pub struct FirstHitBuffer {
 impl FirstHitBuffer {
     /// Traces the buffer of a grid of `columns` x `rows` cells over a film of `width` x `height`
     /// pixels. `first_hits` gets points of the film in pixels, and writes the first hits of the
-    /// camera rays through them (see [`AnyWorld::first_hit`](zerkalo_world::AnyWorld::first_hit)).
+    /// camera rays through them, as [`AnyWorld::first_hit`](zerkalo_world::AnyWorld::first_hit)
+    /// does.
     pub fn new(
         [width, height]: [usize; 2],
         [columns, rows]: [usize; 2],

@@ -34,7 +34,6 @@ impl Options {
 pub struct RenderState {
     pub world: AnyWorld,
     pub film: Film,
-    /// Weight of each light group in the current picture.
     pub weights: LightWeights,
     scene: Arc<Scene>,
     /// Light groups of the film, with the scene for which its samples were traced.

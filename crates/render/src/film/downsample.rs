@@ -208,7 +208,7 @@ impl TilePart {
 }
 
 /// Adds every `step`-th pixel in row `y` of a tile to `line`, the values of one row of cells, laid
-/// out as in [`TilePart::sums`]. The values lack the factor of the covered height.
+/// out as in [`TilePart::sums`]. The values are not yet multiplied by the covered height.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {

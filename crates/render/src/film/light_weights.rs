@@ -47,7 +47,7 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns integer sum `i` (see [`Self::values`] for the order) over `replicates`.
+    /// Returns integer sum `i` over `replicates`. The order is `[group][channel]`.
     #[inline(always)]
     pub fn value(&self, replicates: Replicates, i: usize) -> f64 {
         match replicates {

@@ -51,8 +51,8 @@ fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
 struct Outcome {
     linear: Vec<f64>,
     levels: Vec<f64>,
-    /// Relative standard deviation of a tile's estimated RMSE over films with different random
-    /// seeds; the mean over all tiles.
+    /// Relative standard deviation of a tile's estimated RMSE between random seeds, as the mean
+    /// over all tiles.
     tile_spread: f64,
 }
 

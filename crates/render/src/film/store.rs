@@ -260,17 +260,17 @@ impl Film {
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
-    /// Returns the number of invalid samples, see `Tile::bad_samples`.
+    /// Returns the number of samples that are NaN or negative.
     pub fn bad_samples(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.bad_samples).sum()
     }
 
-    /// Returns the number of saturated samples, see `Tile::saturated_samples`.
+    /// Returns the number of samples above the largest value that the film can store.
     pub fn saturated_samples(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_samples).sum()
     }
 
-    /// Returns the number of saturated pixels, see [`Tile::saturated_pixels`].
+    /// Returns the number of pixels with a sum that has reached `i64::MAX`.
     pub fn saturated_pixels(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }

@@ -19,8 +19,8 @@ static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 /// Integer sums of 16 x 16 pixels of a film. The pixel in column x and row y of the tile has the
 /// number `16 y + x`. Pixels outside the picture stay zero.
 ///
-/// All pixels have the same number of samples in a replicate, except during the first pass, which
-/// adds the first sample of replicate A to more and more pixels, see [`Tile::lattice_px`].
+/// All pixels have the same number of samples in a replicate, except during the first pass. It adds
+/// the first sample of replicate A to ever more pixels; [`Tile::lattice_px`] is its progress.
 #[derive(Debug, Default)]
 pub struct Tile {
     /// Epoch of the film when the tile was written; 0 for a new tile.
@@ -189,7 +189,7 @@ impl Tile {
         }
     }
 
-    /// Adds non-negative `values` to the sums of one light group; see [`Tile::add`].
+    /// Adds non-negative `values` to the sums of one light group, as [`Tile::add`] does.
     #[inline(always)]
     pub fn add_group(&mut self, replicate: usize, pixel: usize, group: usize, values: [i64; 3]) {
         let sums = &mut self.pixel_mut(replicate, pixel)[3 * group..][..3];

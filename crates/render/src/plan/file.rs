@@ -25,7 +25,7 @@ const MAX_SIDE: u32 = 1 << 14;
 /// Bytes of the shortest line of a tile.
 const MIN_TILE_BYTES: usize = 8;
 
-/// Beginning of the first line, whatever the version.
+/// Beginning of the first line of a plan file, in every version of the format.
 const START: &[u8; 13] = b"zerkalo plan ";
 
 pub fn is_plan_file(path: &Path) -> bool {
@@ -121,7 +121,8 @@ impl Plan {
     /// Parses the lines between the title and the checksum.
     fn parse_body(lines: &mut Lines) -> Result<Self, FileError> {
         let positive = |text: &str| number(text).filter(|n: &f64| n.is_finite() && *n > 0.0);
-        // The fields are read in the order of the file. The last two follow other lines.
+        // The fields are read in the order of the file. The last two are set below, after other
+        // lines.
         let mut settings = PlanSettings {
             source: lines.setting("scene", "a file name", |text| Some(text.to_string()))?,
             scene_hash: lines.setting("scene_hash", "a hash", |text| Some(text.to_string()))?,

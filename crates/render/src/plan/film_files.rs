@@ -18,7 +18,7 @@ use zerkalo_scene::value::{sort_by_number, total_order};
 /// minute.
 const LATE: Duration = Duration::from_secs(180);
 
-/// Film files that other processes write, and the sum of their films.
+/// Set of film files that other processes write, with the sum of their films.
 #[derive(Debug, Default)]
 pub struct FilmFiles {
     files: Vec<FilmFile>,
@@ -130,8 +130,8 @@ impl FilmFiles {
     /// Adds the film files of the plan at `path`. Fails if another plan was named before.
     fn name_plan(&mut self, path: &Path) -> Result<(), String> {
         let plan = Plan::read(path).map_err(|error| error.to_string())?;
-        // The base of a plan that continues an earlier plan is the merged film of the earlier plan,
-        // whose file name does not follow from the name of this plan.
+        // If the plan continues an earlier plan, its base is the merged film of the earlier plan,
+        // in a file whose name is unknown here.
         let first = if plan.settings.base_plan.is_some() { BASE + 1 } else { BASE };
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         self.files.extend((first..=plan.settings.shards).map(|shard| {

@@ -18,8 +18,8 @@ pub struct Merged {
 
 impl Merged {
     /// Adds the films of the files at `paths`, in any order. Fails if a file cannot be read or has
-    /// no shards of a plan, if the files belong to different plans, if two files hold the same
-    /// shard, or, without `partial`, if shards are missing or unfinished.
+    /// no shards of a plan, if the files belong to different plans, or if two files hold the same
+    /// shard. Without `partial`, it also fails if shards are missing or unfinished.
     pub fn of_files(paths: &[PathBuf], partial: bool) -> Result<Self, String> {
         let mut films = FilmFiles::of_parts(paths)?;
         let part = films.part().ok_or("no parts are named")?;

@@ -25,9 +25,10 @@ const ROUND_SHARE: f64 = 0.1;
 /// Share of the rays of a round that goes to the tiles with the fewest samples, whatever their
 /// estimates are. It finds features that no sample has hit.
 ///
-/// Mean excess of the true over the reported error of 30 sparse pictures (`tests/error_estimates`):
-/// 18 % with 1/16, 16 % with 1/8, 13 % with 1/4. Rays until the physical mirror room has an RMSE of
-/// 0.00068: 60.7 million with 1/32, 61.7 million with 1/16, 64.8 million with 1/8.
+/// The true error of 30 sparse pictures (`tests/error_estimates`) exceeds the reported one on
+/// average by 18 % with 1/16, 16 % with 1/8, 13 % with 1/4. The scene of the mirror room needs 60.7
+/// million rays to a linear RMSE of 0.00068 with 1/32, 61.7 million with 1/16, 64.8 million with
+/// 1/8.
 pub(super) const EXPLORATION: f64 = 0.0625;
 /// Smallest number of blocks in a round, which keeps every thread busy until the end of the round.
 /// A round has fewer if fewer tiles can get samples or fewer blocks meet the error target.
@@ -43,8 +44,8 @@ const OWN_WEIGHT: f64 = 0.25;
 /// tile's own validation estimate has a large weight; tiles whose estimate is low by chance would
 /// get no samples, and the reported error would be too low.
 ///
-/// Ratio of true to reported error in 40 sparse pictures (`tests/error_estimates`, 48 to 64 seeds
-/// each): 1.02 to 1.55 without widening, 0.96 to 1.24 with 9 tiles, 0.94 to 1.23 with 17.
+/// The ratio of true to reported error in 40 sparse pictures (`tests/error_estimates`, 48 to 64
+/// seeds each) is 1.02 to 1.55 without widening, 0.96 to 1.24 with 9 tiles, 0.94 to 1.23 with 17.
 const MIN_CLASS_TILES: f64 = 17.0;
 /// Largest distance between a class and a class that widens it. The distance is the number of
 /// factors of sqrt(2) between their allocation estimates, plus that between their sample counts.
@@ -226,9 +227,9 @@ impl Schedule {
     }
 
     /// Returns the model of each tile's expected error. At the present sample count, the expected
-    /// error is the mean of the validation estimates of the tile's class and of the tile's own
-    /// allocation estimate, weighted by pixels and [`OWN_WEIGHT`]. The own estimate keeps the
-    /// expected error above 0 if the validation estimates of the class are 0.
+    /// error is a mean of the validation estimates of the tile's class, weighted by pixels, and of
+    /// the tile's own allocation estimate, weighted by its pixels times [`OWN_WEIGHT`]. The own
+    /// estimate keeps the expected error above 0 if the validation estimates of the class are 0.
     pub(super) fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);

@@ -72,7 +72,7 @@ pub struct Spp {
 /// Sample counts and noise estimates of the tiles of a render, and the jobs to trace next.
 #[derive(Clone, Debug, Default)]
 pub struct Schedule {
-    /// Settings. If stop criteria are set that are not reached, a finished render resumes.
+    /// Settings of the render. New stop criteria that are not reached resume a finished render.
     pub settings: Settings,
     tiles: Vec<Tile>,
     /// Jobs of the current round, each for both replicates.
@@ -93,8 +93,8 @@ pub struct Schedule {
     /// Light period: the number of samples of a pixel that together trace a shadow ray to each
     /// light once; see [`WorldInfo::light_period`](zerkalo_world::WorldInfo::light_period).
     ///
-    /// The error falls steeply at this number of samples, so that estimates from fewer samples do
-    /// not predict it. They are discarded once a tile has an estimate from at least this number.
+    /// The error falls steeply at this number of samples. Estimates from fewer samples do not
+    /// predict the fall. They are discarded once a tile has an estimate from at least this number.
     pub light_period: u32,
 }
 

@@ -112,7 +112,7 @@ impl Schedule {
         };
         Some(Prediction {
             tiles: self.tiles.iter().zip(&allocation.counts).map(tile).collect(),
-            // The true error exceeds the predicted one, see `AIM`.
+            // The true error is expected to exceed the predicted one by the factor 1 / `AIM`.
             rmse: (scale * error / self.pixels() as f64).sqrt() / AIM,
             slopes,
         })

@@ -11,7 +11,6 @@ use zerkalo_scene::Scene;
 /// Film of a session with its report.
 pub struct Picture<'a> {
     pub film: &'a Film,
-    /// Weight of each light group in the picture.
     pub weights: &'a LightWeights,
     pub report: &'a Report,
     pub(super) source: Source<'a>,

@@ -63,9 +63,7 @@ const DONE: Tag = *b"DONE";
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmFileHeader {
     pub film: Header,
-    /// Weight of each light group in the picture.
     pub weights: LightWeights,
-    /// Name of each light group of the film.
     pub group_names: Vec<String>,
     /// Display transform with which the noise of the picture was estimated.
     pub display: Display,

@@ -52,8 +52,8 @@ struct Model {
     hidden: Vec<usize>,
     /// Numbers of the tiles that have no error from [`PERIOD`] samples per replicate on.
     periodic: Vec<usize>,
-    /// Number of samples that together trace a shadow ray to each light once; see
-    /// [`Schedule::light_period`].
+    /// Value of [`Schedule::light_period`]: the number of samples that together trace a shadow ray
+    /// to each light once.
     light_period: u32,
 }
 
