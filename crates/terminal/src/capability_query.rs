@@ -140,7 +140,7 @@ fn listen(
 }
 
 impl Capabilities {
-    /// Updates the capabilities by a reply.
+    /// Updates the capabilities from a reply.
     pub fn learn(&mut self, reply: &Reply) {
         match reply {
             Reply::Attributes(attributes) => {

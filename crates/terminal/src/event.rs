@@ -73,7 +73,7 @@ pub struct Mouse {
     pub modified: bool,
 }
 
-/// Names of keys without a character.
+/// Names of the keys that are not written as their character.
 const NAMED: &[(&str, Code)] = &[
     ("Enter", Code::Enter),
     ("Esc", Code::Esc),

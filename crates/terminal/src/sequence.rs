@@ -23,7 +23,7 @@ pub struct Interpreter {
     pub reply: Reply,
     /// Data of the device control string.
     data: Vec<u8>,
-    /// Conversion of `data` to a reply.
+    /// Conversion of `data` to a reply; `None` if it is not a known reply.
     to_reply: Option<fn(String) -> Reply>,
 }
 
@@ -161,7 +161,7 @@ pub fn single_shift(modifiers: u16, last: u8) -> Option<Event> {
     Some(Event::Key(modified(Key::plain(code), modifiers)))
 }
 
-/// Interprets `ESC [ [ last` of the Linux console.
+/// Interprets `ESC [ [ last`, by which the Linux console reports F1 to F5.
 pub fn console_key(last: u8) -> Option<Event> {
     (b'A'..=b'E').contains(&last).then(|| Event::Key(Key::plain(Code::F(last - b'A' + 1))))
 }

@@ -383,7 +383,7 @@ fn in_pieces(decoder: &mut Decoder, bytes: &[u8], cuts: &[usize]) -> Vec<Event> 
     cuts.windows(2).flat_map(|piece| decoder.take(&bytes[piece[0]..piece[1]])).collect()
 }
 
-/// Checks input that the parser `vte` alone would decode differently (see the module `decode`).
+/// Checks input that the parser `vte` alone would decode differently. The module `decode` lists it.
 #[test]
 fn keyboard_sequences_beyond_vte_are_decoded() {
     for (bytes, expected) in [

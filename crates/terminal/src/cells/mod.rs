@@ -54,7 +54,7 @@ pub struct Raster {
 }
 
 impl Raster {
-    /// Creates an image from the colour of each pixel, numbered row by row.
+    /// Creates an image. `pixel` returns the colour of each pixel, which are numbered row by row.
     pub fn from_fn(width: usize, height: usize, pixel: impl FnMut(usize) -> [u8; 3]) -> Self {
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }

@@ -44,7 +44,7 @@ const MAX_TEXT: usize = 1500;
 /// Number of bytes below which the time of a frame is mostly latency: its acknowledgement may raise
 /// the measured rate, but not lower it.
 const SMALL: usize = 1000;
-/// Time after which a missing acknowledgement counts as lost.
+/// Time after which a frame without acknowledgement counts as lost.
 const LOST_AFTER: Duration = Duration::from_secs(3);
 /// Number of consecutive losses after which acknowledgements are no longer requested.
 const MAX_LOSSES: u32 = 3;
@@ -56,7 +56,7 @@ const NEW_WEIGHT: f64 = 0.3;
 const ACTIVE_TIME: Duration = Duration::from_millis(500);
 /// Interval at which the send queue is measured.
 const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
-/// Interval at which the send queue is measured after no byte has left it for [`LOST_AFTER`].
+/// Interval at which the send queue is measured once no byte has left it for [`LOST_AFTER`].
 const STALLED_INTERVAL: Duration = Duration::from_millis(500);
 /// Assumed round trip before the first measurement.
 const DEFAULT_ROUND_TRIP: Duration = Duration::from_millis(100);
@@ -231,8 +231,8 @@ impl FlowControl {
         due.then_some(FrameBudget { bytes: text_bytes, picture: false, refinement: 0 })
     }
 
-    /// Returns the next time at which [`FlowControl::allowance`] may permit a frame without a reply
-    /// or input. `text` is `true` if text may remain to be sent.
+    /// Returns the next time at which [`FlowControl::allowance`] may permit a frame if neither a
+    /// reply nor input arrives before. `text` is `true` if text may remain to be sent.
     pub fn wakes_at(&self, now: Duration, text: bool) -> Duration {
         let after = |interval| self.last_frame.map_or(now, |last| last + interval);
         let frame = after(FRAME_INTERVAL);

@@ -65,7 +65,7 @@ struct Busy {
     is_full: bool,
     /// Time at which bytes last left the queue.
     progress: Duration,
-    /// Bytes that have left the queue in total.
+    /// Largest measured number of bytes that had left the queue in total.
     most_drained: f64,
 }
 
