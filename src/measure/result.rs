@@ -89,9 +89,9 @@ pub fn median(values: &[f64]) -> f64 {
 /// same machine differs by at most this fraction in about four of five cases.
 ///
 /// It is half the width of the confidence interval of the median by the sign test (Conover,
-/// *Practical Nonparametric Statistics*), widened by sqrt 2 for the comparison of two medians, and
-/// divided by the median. For fewer than five values it is their range divided by the median; for
-/// fewer than two, or if the median is 0, it is 0.
+/// *Practical Nonparametric Statistics*), divided by the median. The interval is widened by sqrt 2
+/// for the comparison of two medians. For fewer than five values the spread is their range divided
+/// by the median; for fewer than two, or if the median is 0, it is 0.
 pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     if values.len() < 2 || middle == 0.0 {
