@@ -112,11 +112,12 @@ impl Estimator {
     /// Estimates the error of a tile, even if replicate B has fewer samples than A. Returns `None`
     /// if A or B has no samples, or during the first pass.
     ///
-    /// Let A have n samples and B have m, each of variance v. (A - B)^2 then has the mean v (n + m)
-    /// / nm. The picture (nA + mB) / (n + m) has the variance v / (n + m). The half difference is
-    /// therefore replaced by d = (A - B) sqrt(nm) / (n + m). This is exact for independent samples.
-    /// With stratified samples, the variance of a mean of n samples may fall faster than v / n. The
-    /// estimate is then too high, by at most a quarter if B has at least half as many samples as A.
+    /// Let A be the mean of n samples and B that of m, each sample with variance v. (A - B)^2 then
+    /// has the mean v (n + m) / nm. The picture (nA + mB) / (n + m) has the variance v / (n + m).
+    /// The half difference is therefore replaced by d = (A - B) sqrt(nm) / (n + m). This is exact
+    /// for independent samples. With stratified samples, the variance of a mean of n samples may
+    /// fall faster than v / n. The estimate is then too high, by at most a quarter if B has at
+    /// least half as many samples as A.
     pub fn tile_so_far(&self, tile: &Tile) -> Option<TileNoise> {
         let counts = tile.counts;
         if counts.contains(&0) || tile.lattice_px != 0 {

@@ -31,7 +31,6 @@ pub struct FilmFiles {
     pub sum: Option<SavedFilm>,
 }
 
-/// Plan file that the user named.
 #[derive(Debug)]
 struct NamedPlan {
     path: PathBuf,

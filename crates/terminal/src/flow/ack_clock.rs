@@ -6,8 +6,8 @@ use crate::flow::{FRAME_SPAN, LOST_AFTER, SMALL};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Longest interval between two acknowledgements that are combined into one measurement. If the
-/// first was delayed, the second alone would give too high a rate.
+/// Longest interval between two acknowledgements that are combined into one measurement. The second
+/// alone would give too high a rate if the first was delayed.
 const ACKS_TOGETHER: Duration = Duration::from_millis(20);
 
 /// Frames in flight, which the terminal acknowledges, and the last measurement of the rate.
