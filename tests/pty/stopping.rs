@@ -126,7 +126,7 @@ fn unsaved_edits_are_recovered_by_the_next_start() {
     assert_eq!(fs::read_to_string(fixture.path("room.toml")).unwrap(), MIRROR_ROOM);
 
     let mut terminal = fixture.open(&["room.toml"], [120, 36]);
-    terminal.wait_for_text(" s ago with");
+    terminal.wait_for_text(" ago with");
     terminal.send("r");
     terminal.wait_for_text("recovered");
     terminal.send("\x13");

@@ -59,6 +59,8 @@ fn picture_follows_the_files_of_other_processes() {
 #[test]
 fn checkpoint_is_watched_while_its_render_runs() {
     let fixture = Fixture::with_room();
+    // The file does not exist yet.
+    let mut terminal = fixture.open(&["watch", "a.zk"], [120, 36]);
     let mut render = Command::new(PROGRAM)
         .args(["render", "room.toml", "-o", "a.png", "--size", "160x120", "--noise", "1e-6"])
         .args(["--checkpoint", "a.zk", "--checkpoint-interval", "0.3", "--threads", "1"])
@@ -68,8 +70,6 @@ fn checkpoint_is_watched_while_its_render_runs() {
         .stderr(std::process::Stdio::null())
         .spawn()
         .unwrap();
-    // The file may not exist yet.
-    let mut terminal = fixture.open(&["watch", "a.zk"], [120, 36]);
     wait_for_picture(&terminal);
     let samples = |screen: &vt100::Screen| {
         let text = screen.contents();

@@ -51,7 +51,7 @@ use crate::material::Material;
 use crate::value::{FieldValue, KeyNode, ValueType, children};
 use std::collections::BTreeMap;
 
-/// Description of a whole scene. [`Scene::faults`] tells whether it is valid.
+/// Description of a whole scene. [`Scene::faults`] checks it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Film settings: size, pixel filter, sample limit.

@@ -297,9 +297,9 @@ struct Facet<L> {
 /// the surface.
 ///
 /// In refraction, the microfacet normal h has the direction n_i V + n_t L, with V the direction to
-/// the viewer and L = `direction`. The solid angle of h per solid angle of L is n_t^2 L.h / |n_i V
-/// + n_t L|^2 (Walter et al. 2007, eq. 16 and 17). At thin surfaces the transmitted ray is the
-/// reflected ray, mirrored to the other side.
+/// the viewer and L = `direction`. The solid angle of h per solid angle of L is
+/// n_t^2 L.h / |n_i V + n_t L|^2 (Walter et al. 2007, eq. 16 and 17). At thin surfaces the
+/// transmitted ray is the reflected ray, mirrored to the other side.
 #[inline(always)]
 fn facet<L: SimdFloat>(
     facets: &MicrofacetDistribution<L::Scalar>,
