@@ -3,8 +3,9 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES};
+use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, polygon};
 use glam::DVec3;
+use std::collections::HashMap;
 use zerkalo_kernel::primitive::TriangleMesh;
 use zerkalo_kernel::primitive::mesh::smooth;
 
@@ -31,6 +32,8 @@ pub struct Builder<'a> {
     /// Texture coordinates of the vertices, in order. The list may be shorter than `positions`; the
     /// other vertices have no texture coordinates.
     uvs: Vec<[f32; 2]>,
+    /// Copies of vertices, by vertex and bits of the texture coordinates.
+    with_uvs: HashMap<(u32, [u32; 2]), u32>,
     triangles: Vec<[u32; 3]>,
     colors: Vec<[f32; 3]>,
     /// Index in `colors` of the colour of each triangle; 0 for triangles added before the first
@@ -38,8 +41,12 @@ pub struct Builder<'a> {
     color_of: Vec<u16>,
     /// Index in `colors` of the colour of the triangles added next.
     color: u16,
-    notes: Vec<String>,
+    /// Notes for the user, and how often each occurred.
+    notes: Vec<(String, usize)>,
 }
+
+/// Largest number of different notes. Further ones are ignored.
+const MAX_NOTES: usize = 32;
 
 impl<'a> Builder<'a> {
     /// Creates a builder without vertices. `source` is the mesh file, which error messages name.
@@ -49,6 +56,7 @@ impl<'a> Builder<'a> {
             positions: Vec::new(),
             normals: Vec::new(),
             uvs: Vec::new(),
+            with_uvs: HashMap::new(),
             triangles: Vec::new(),
             colors: Vec::new(),
             color_of: Vec::new(),
@@ -85,10 +93,14 @@ impl<'a> Builder<'a> {
     }
 
     /// Records a note for the user about a part of the file that was omitted or replaced.
-    /// Repetitions are ignored.
-    pub fn note(&mut self, note: String) {
-        if !self.notes.contains(&note) {
-            self.notes.push(note);
+    /// Repetitions are counted.
+    pub fn note(&mut self, note: impl Into<String>) {
+        let note = note.into();
+        let found = self.notes.iter_mut().find(|(known, _)| *known == note);
+        if let Some((_, count)) = found {
+            *count += 1;
+        } else if self.notes.len() < MAX_NOTES {
+            self.notes.push((note, 1));
         }
     }
 
@@ -118,6 +130,18 @@ impl<'a> Builder<'a> {
         index as u32
     }
 
+    /// Returns a vertex like `vertex`, but with the texture coordinates `uv`.
+    pub fn with_uv(&mut self, vertex: u32, uv: [f32; 2]) -> u32 {
+        let key = (vertex, uv.map(f32::to_bits));
+        if let Some(known) = self.with_uvs.get(&key) {
+            return *known;
+        }
+        let i = vertex as usize;
+        let copy = self.vertex(self.positions[i], self.normals.get(i).copied(), Some(uv));
+        self.with_uvs.insert(key, copy);
+        copy
+    }
+
     /// Returns `true` if [`Builder::color`] was called.
     pub fn has_colors(&self) -> bool {
         !self.colors.is_empty()
@@ -140,32 +164,50 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Adds a triangle. `place` returns the location of the triangle in the file.
-    pub fn triangle(
-        &mut self,
-        corners: [u32; 3],
-        place: impl Fn() -> FileLocation,
-    ) -> Result<(), AssetError> {
-        let vertices = self.positions.len();
-        if let Some(unknown) = corners.iter().find(|i| **i as usize >= vertices) {
-            let found = format!("the face names vertex {unknown}, counted from 0");
-            let expected = format!("a vertex below {vertices}, their number");
-            return Err(self.source.error(place(), found, &expected));
-        }
+    /// Adds a triangle of three vertices.
+    pub fn triangle(&mut self, corners: [u32; 3]) -> Result<(), AssetError> {
         self.check_limits(0, 1)?;
         self.triangles.push(corners);
         self.color_of.push(self.color);
         Ok(())
     }
 
-    /// Adds a polygon as triangles: a fan around its first corner.
-    pub fn polygon(
-        &mut self,
-        corners: &[u32],
+    /// Returns the vertex that `number` names, counted from the vertex `first`.
+    pub fn index(
+        &self,
+        number: f64,
+        first: usize,
         place: impl Fn() -> FileLocation,
-    ) -> Result<(), AssetError> {
+    ) -> Result<u32, AssetError> {
+        let count = self.positions.len() - first;
+        if (0.0..count as f64).contains(&number) {
+            return Ok((first + number as usize) as u32);
+        }
+        let found = format!("the face names vertex {number}, counted from 0");
+        let expected = format!("a vertex below {count}, their number");
+        Err(self.source.error(place(), found, &expected))
+    }
+
+    /// Adds a polygon of any shape in a plane as triangles.
+    pub fn polygon(&mut self, corners: &[u32]) -> Result<(), AssetError> {
+        if corners.len() < 3 {
+            self.note("a face of fewer than three corners was left out");
+        }
+        let divided = (corners.len() > 3).then(|| {
+            let position = |i: &u32| DVec3::from(self.positions[*i as usize]);
+            polygon::divide(&corners.iter().map(position).collect::<Vec<_>>())
+        });
+        if let Some(division) = divided.flatten() {
+            if !division.is_exact {
+                self.note("a polygon whose outline crosses itself is uncertain");
+            }
+            for triangle in division.triangles {
+                self.triangle(triangle.map(|i| corners[i]))?;
+            }
+            return Ok(());
+        }
         for pair in corners.get(1..).unwrap_or_default().windows(2) {
-            self.triangle([corners[0], pair[0], pair[1]], &place)?;
+            self.triangle([corners[0], pair[0], pair[1]])?;
         }
         Ok(())
     }
@@ -194,7 +236,7 @@ impl<'a> Builder<'a> {
             return Err(source.fault(found, "a size from 1e-9 to 1e9"));
         }
         let normals = self.unit_normals(&positions);
-        let uvs = self.checked_uvs(positions.len())?;
+        let uvs = self.checked_uvs(positions.len());
         self.triangles.shrink_to_fit();
         let color_of = if self.colors.len() > 1 { self.color_of } else { Vec::new() };
         Ok(TriangleMesh {
@@ -206,7 +248,7 @@ impl<'a> Builder<'a> {
             colors: self.colors,
             color_of,
             bounds: [low, high].map(|corner| corner.as_vec3().to_array()),
-            notes: self.notes,
+            notes: self.notes.into_iter().map(counted).collect(),
         })
     }
 
@@ -249,10 +291,8 @@ impl<'a> Builder<'a> {
             let found = format!("none of the {before} triangles has an area");
             return Err(self.source.fault(found, "at least one that has"));
         }
-        match dropped {
-            0 => {}
-            1 => self.notes.push("1 triangle without area was left out".to_string()),
-            n => self.notes.push(format!("{n} triangles without area were left out")),
+        if dropped > 0 {
+            self.notes.push(("a triangle without area was left out".to_string(), dropped));
         }
         Ok(())
     }
@@ -285,29 +325,32 @@ impl<'a> Builder<'a> {
             for (n, c) in normals.iter_mut().zip(computed).filter(|(n, _)| **n == [0.0; 3]) {
                 *n = c;
             }
-            self.notes.push(format!("{without} vertices have no normal in the file; computed"));
+            self.notes.push(("a vertex without a normal got a computed one".to_string(), without));
         }
         Some(normals)
     }
 
-    /// Returns the texture coordinates of the vertices. Vertices without texture coordinates get
-    /// zero. Returns `None` if no vertex has any.
-    ///
-    /// # Errors
-    /// Fails if a texture coordinate is not finite.
-    fn checked_uvs(&mut self, vertices: usize) -> Result<Option<Vec<[f32; 2]>>, AssetError> {
+    /// Returns the texture coordinates of the vertices. Vertices without texture coordinates, or
+    /// with infinite ones or NaN, get zero. Returns `None` if no vertex has any.
+    fn checked_uvs(&mut self, vertices: usize) -> Option<Vec<[f32; 2]>> {
         let mut uvs = std::mem::take(&mut self.uvs);
         if uvs.is_empty() {
-            return Ok(None);
+            return None;
         }
-        if let Some(i) = uvs.iter().position(|uv| uv.iter().any(|x| !x.is_finite())) {
-            let place = FileLocation::Part(format!("vertex {i} (from 0)"));
-            let found = format!("texture coordinates are [{}, {}]", uvs[i][0], uvs[i][1]);
-            return Err(self.source.error(place, found, "finite numbers"));
+        let unknown = uvs.iter_mut().filter(|uv| !uv.iter().all(|x| x.is_finite()));
+        let unknown = unknown.map(|uv| *uv = [0.0; 2]).count();
+        if unknown > 0 {
+            let note = "texture coordinates that are no numbers were replaced by 0".to_string();
+            self.notes.push((note, unknown));
         }
         uvs.resize(vertices, [0.0; 2]);
-        Ok(Some(uvs))
+        Some(uvs)
     }
+}
+
+/// Returns a note with the number of its occurrences.
+fn counted((note, count): (String, usize)) -> String {
+    if count == 1 { note } else { format!("{note} ({count} times)") }
 }
 
 /// Returns the lowest and the highest corner of the bounding box.

@@ -9,6 +9,7 @@
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES};
 use crate::asset::mesh::builder::Builder;
+use crate::asset::mesh::strip;
 use crate::value::truncated;
 use base64::Engine;
 use glam::{DAffine3, DMat4, DVec3};
@@ -167,8 +168,7 @@ fn faces(mode: Mode, corners: usize, mirrored: bool) -> impl ExactSizeIterator<I
     let count = if mode == Mode::Triangles { corners / 3 } else { corners.saturating_sub(2) };
     (0..count).map(move |i| {
         let [a, b, c] = match mode {
-            Mode::TriangleStrip if i % 2 == 1 => [i + 1, i, i + 2],
-            Mode::TriangleStrip => [i, i + 1, i + 2],
+            Mode::TriangleStrip => strip(i),
             Mode::TriangleFan => [0, i + 1, i + 2],
             _ => [3 * i, 3 * i + 1, 3 * i + 2],
         };
@@ -189,11 +189,11 @@ impl<'a> Part<'a> {
     fn add(&self, builder: &mut Builder) -> Result<(), AssetError> {
         let mode = self.primitive.mode();
         if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
-            builder.note("points and lines were left out".to_string());
+            builder.note("points and lines were left out");
             return Ok(());
         }
         let Some(positions) = self.primitive.get(&Semantic::Positions) else {
-            builder.note("a part without positions was left out".to_string());
+            builder.note("a part without positions was left out");
             return Ok(());
         };
         let vertices = positions.count();
@@ -230,17 +230,12 @@ impl<'a> Part<'a> {
         let place =
             || FileLocation::Part(format!("meshes[..].primitives[{}]", self.primitive.index()));
         let corner = |i: usize| match &indices {
-            Some(slice) => slice.numbers::<1>(i)[0] as u32,
-            None => i as u32,
+            Some(slice) => slice.numbers::<1>(i)[0],
+            None => i as f64,
         };
-        for face in faces {
-            let triangle = face.map(corner);
-            if let Some(beyond) = triangle.iter().find(|i| **i as usize >= vertices) {
-                let found = format!("a triangle names vertex {beyond}, counted from 0");
-                let expected = format!("a vertex below {vertices}, their number");
-                return Err(self.source.error(place(), found, &expected));
-            }
-            builder.triangle(triangle.map(|i| i + base as u32), place)?;
+        for [a, b, c] in faces {
+            let index = |i| builder.index(corner(i), base, place);
+            builder.triangle([index(a)?, index(b)?, index(c)?])?;
         }
         Ok(())
     }

@@ -4,7 +4,9 @@ mod builder;
 mod gltf;
 mod obj;
 mod ply;
+mod polygon;
 mod stl;
+mod text;
 
 use crate::asset::error::AssetError;
 use crate::asset::file::FileContents;
@@ -37,4 +39,10 @@ pub(super) fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
             Err(source.fault(found, "a name that ends in .obj, .ply, .stl, .gltf or .glb"))
         }
     }
+}
+
+/// Returns the corners of triangle `i` of a triangle strip. Every second one has the opposite sense
+/// of rotation.
+fn strip(i: usize) -> [usize; 3] {
+    if i.is_multiple_of(2) { [i, i + 1, i + 2] } else { [i + 1, i, i + 2] }
 }

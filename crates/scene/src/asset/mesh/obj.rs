@@ -1,9 +1,11 @@
-//! Wavefront OBJ files, with the diffuse colours of their MTL files.
+//! Wavefront OBJ files, with the diffuse colours of their MTL files. Points, lines, free-form
+//! surfaces, textures and the colours of vertices are not read.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::builder::{Builder, MAX_COORDINATE};
-use crate::value::truncated;
+use crate::asset::mesh::text::{Lines, number, numbers, shown, words};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use zerkalo_kernel::primitive::TriangleMesh;
@@ -30,10 +32,14 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
         libraries: Vec::new(),
         colors: HashMap::new(),
         material: None,
+        has_unknown_material: false,
     };
-    for line in source.bytes.split(|byte| *byte == b'\n') {
-        parser.line += 1;
-        parser.parse_line(&String::from_utf8_lossy(line))?;
+    for (line, text) in LogicalLines(Lines::new(&source.bytes)) {
+        parser.line = line;
+        parser.parse_line(&text)?;
+    }
+    if parser.has_unknown_material && !parser.colors.is_empty() {
+        parser.builder.note("a material that no library before it defines is white");
     }
     parser.builder.finish()
 }
@@ -55,18 +61,42 @@ struct Parser<'a> {
     /// MTL files that have been read.
     libraries: Vec<PathBuf>,
     /// Diffuse colours of the materials, by name.
-    colors: HashMap<String, [f32; 3]>,
+    colors: HashMap<Vec<u8>, [f32; 3]>,
     /// Name of the present material; `None` if no MTL file that has been read defines it.
-    material: Option<String>,
+    material: Option<Vec<u8>>,
+    has_unknown_material: bool,
+}
+
+/// Lines of a text, each with the number of its first line in the file. A line that ends with `\`
+/// continues on the next one; a comment does not, because it may end with a path of Windows.
+struct LogicalLines<'a>(Lines<'a>);
+
+impl<'a> Iterator for LogicalLines<'a> {
+    type Item = (usize, Cow<'a, [u8]>);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (number, line) = self.0.next()?;
+        let is_comment = line.trim_ascii_start().starts_with(b"#");
+        let mut line = Cow::Borrowed(line);
+        while !is_comment && let Some(start) = line.trim_ascii_end().strip_suffix(b"\\") {
+            let length = start.len();
+            let joined = line.to_mut();
+            joined.truncate(length);
+            joined.push(b' ');
+            joined.extend(self.0.next().unwrap_or_default().1);
+        }
+        Some((number, line))
+    }
 }
 
 impl Parser<'_> {
     /// Parses a line and adds its content. Lines with unknown keywords are ignored.
-    fn parse_line(&mut self, line: &str) -> Result<(), AssetError> {
+    fn parse_line(&mut self, line: &[u8]) -> Result<(), AssetError> {
         let (keyword, rest) = keyword(line);
+        let values = without_comment(rest);
         match keyword {
-            "v" => {
-                let position = position(rest);
+            b"v" => {
+                let position = self.position(values);
                 let position = position.ok_or_else(|| self.wrong("vertex is not three numbers"))?;
                 if !position.iter().all(|x| x.abs() <= MAX_COORDINATE) {
                     let [x, y, z] = position;
@@ -75,24 +105,31 @@ impl Parser<'_> {
                 }
                 self.positions.push(position);
             }
-            "vt" => {
-                let wrong = || self.wrong("texture coordinate is not two numbers");
-                self.uvs.push(numbers(rest).ok_or_else(wrong)?);
+            b"vt" => {
+                let uv = match words(values).count() {
+                    1 => numbers(values).map(|[u]| [u, 0.0]),
+                    _ => numbers(values),
+                };
+                self.uvs.push(uv.ok_or_else(|| self.wrong("texture coordinate is not numbers"))?);
             }
-            "vn" => {
+            b"vn" => {
                 let wrong = || self.wrong("normal is not three numbers");
-                self.normals.push(numbers(rest).ok_or_else(wrong)?);
+                self.normals.push(numbers(values).ok_or_else(wrong)?);
             }
-            "f" => self.add_face(rest)?,
-            "o" | "g" => self.vertices.clear(),
-            "usemtl" => {
-                let material = self.colors.contains_key(rest).then(|| rest.to_string());
+            b"f" | b"fo" => self.add_face(values)?,
+            b"o" | b"g" => self.vertices.clear(),
+            b"l" | b"p" => self.builder.note("points and lines were left out"),
+            b"curv" | b"surf" => self.builder.note("curves and free-form surfaces were left out"),
+            b"usemtl" => {
+                let known = [rest, values].into_iter().find(|name| self.colors.contains_key(*name));
+                let material = known.map(<[u8]>::to_vec);
                 if material != self.material {
                     self.vertices.clear();
                 }
+                self.has_unknown_material |= material.is_none() && !values.is_empty();
                 self.material = material;
             }
-            "mtllib" => self.read_library(rest)?,
+            b"mtllib" => self.read_libraries(rest),
             _ => {}
         }
         Ok(())
@@ -108,32 +145,33 @@ impl Parser<'_> {
 
     /// Adds a polygon. Each word names a corner by one to three indices: `1`, `1/2`, `1//3` or
     /// `1/2/3`.
-    fn add_face(&mut self, words: &str) -> Result<(), AssetError> {
+    fn add_face(&mut self, values: &[u8]) -> Result<(), AssetError> {
         if !self.colors.is_empty() {
             let color = self.material.as_ref().and_then(|name| self.colors.get(name));
             self.builder.color(*color.unwrap_or(&UNCOLORED))?;
         }
         let mut corners = Vec::new();
-        for word in words.split_whitespace() {
-            let mut indices = word.split('/');
-            let mut next = |what, count| self.index(indices.next().unwrap_or(""), what, count);
+        for word in words(values) {
+            let mut indices = word.split(|byte| *byte == b'/');
+            let mut next = |what, count| self.index(indices.next().unwrap_or(b""), what, count);
             let position = next("vertex", self.positions.len())?;
             let uv = next("texture coordinate", self.uvs.len())?;
             let normal = next("normal", self.normals.len())?;
             let position = position.ok_or_else(|| self.wrong("face is not a list of indices"))?;
             corners.push(self.vertex((position, uv, normal)));
         }
-        self.builder.polygon(&corners, || FileLocation::Line(self.line))
+        self.builder.polygon(&corners)
     }
 
     /// Parses the index of one of the `count` entries of the kind `what` so far: from 1, or from -1
     /// backwards. Returns the index from 0. Returns `None` if `word` is empty, or if there are no
     /// texture coordinates or normals to which it could refer.
-    fn index(&self, word: &str, what: &str, count: usize) -> Result<Option<usize>, AssetError> {
+    fn index(&self, word: &[u8], what: &str, count: usize) -> Result<Option<usize>, AssetError> {
         if word.is_empty() || count == 0 && what != "vertex" {
             return Ok(None);
         }
-        let index: i64 = word.parse().map_err(|_| self.wrong("face is not a list of indices"))?;
+        let index = std::str::from_utf8(word).ok().and_then(|word| word.parse::<i64>().ok());
+        let index = index.ok_or_else(|| self.wrong("face is not a list of indices"))?;
         let from_0 = if index > 0 { index - 1 } else { index.saturating_add(count as i64) };
         match usize::try_from(from_0).ok().filter(|i| *i < count) {
             Some(index) => Ok(Some(index)),
@@ -155,71 +193,91 @@ impl Parser<'_> {
         })
     }
 
-    /// Reads the diffuse colours of the MTL file `name`. Records a note if the file cannot be read.
-    /// Fails if the name could lead out of the folder of the OBJ file.
-    fn read_library(&mut self, name: &str) -> Result<(), AssetError> {
-        let Some(path) = self.source.resolve_relative(name) else {
-            return Err(self.error(
-                format!("mtllib names \"{}\"", truncated(name)),
-                "a relative path without \"..\", to a file in the same folder or below",
-            ));
+    /// Parses three coordinates. If exactly one more number follows, it is the weight of the vertex,
+    /// by which they are divided. If several follow, they are a colour.
+    fn position(&mut self, values: &[u8]) -> Option<[f64; 3]> {
+        let position: [f64; 3] = numbers(values)?;
+        let weight = match words(values).skip(3).count() {
+            0 => 1.0,
+            1 => number(words(values).nth(3)?)?,
+            _ => {
+                self.builder.note("a colour of a vertex was not read");
+                1.0
+            }
+        };
+        (weight != 0.0).then(|| position.map(|x| x / weight))
+    }
+
+    /// Reads the MTL files that `names` states: one file whose name may have blanks, or several.
+    fn read_libraries(&mut self, names: &[u8]) {
+        let names = names.strip_prefix(b"\"").unwrap_or(names);
+        let names = names.strip_suffix(b"\"").unwrap_or(names);
+        let is_file = |name: &[u8]| {
+            self.source
+                .resolve_relative(&String::from_utf8_lossy(name))
+                .is_some_and(|p| p.is_file())
+        };
+        let words = || words(names).take(MAX_MTL_FILES);
+        let several = !is_file(names) && words().any(is_file);
+        let names: Vec<_> = if several { words().collect() } else { vec![names] };
+        names.into_iter().filter(|name| !name.is_empty()).for_each(|name| self.read_library(name));
+    }
+
+    /// Reads the diffuse colours of the MTL file `name`. Records a note if the file cannot be read,
+    /// or if its name could lead out of the folder of the OBJ file.
+    fn read_library(&mut self, name: &[u8]) {
+        let Some(path) = self.source.resolve_relative(&String::from_utf8_lossy(name)) else {
+            let name = shown(name);
+            return self
+                .builder
+                .note(format!("no colours: \"{name}\" is not in the mesh's folder"));
         };
         if self.libraries.contains(&path) || self.libraries.len() >= MAX_MTL_FILES {
-            return Ok(());
+            return;
         }
         match FileContents::read(&path, MAX_MTL_BYTES) {
-            Ok(library) => self.add_colors(&String::from_utf8_lossy(&library.bytes)),
+            Ok(library) => self.add_colors(&library.bytes),
             Err(error) => self.builder.note(format!("no colours: {}", error.what())),
         }
         self.libraries.push(path);
-        Ok(())
     }
 
-    /// Adds the diffuse colours (`Kd`) in the MTL text `library`. Invalid colours are ignored.
-    fn add_colors(&mut self, library: &str) {
-        let mut name = "";
-        for line in library.lines() {
-            match keyword(line) {
-                ("newmtl", new) => {
-                    name = new;
-                    self.colors.insert(name.to_string(), UNCOLORED);
+    /// Adds the diffuse colours (`Kd`) in the MTL text `library`.
+    fn add_colors(&mut self, library: &[u8]) {
+        let mut name = Vec::new();
+        for (_, line) in LogicalLines(Lines::new(library)) {
+            match keyword(&line) {
+                (b"newmtl", new) => {
+                    name = new.to_vec();
+                    self.colors.insert(name.clone(), UNCOLORED);
                 }
-                ("Kd", words) => {
-                    let grey = || numbers(words).map(|[grey]| [grey; 3]);
-                    let color: Option<[f64; 3]> = numbers(words).or_else(grey);
+                (b"Kd", values) => {
+                    let grey = || numbers(values).map(|[grey]| [grey; 3]);
+                    let color: Option<[f64; 3]> = numbers(values).or_else(grey);
                     let color = color.filter(|c| c.iter().all(|x| (0.0..=1e6).contains(x)));
-                    if let (Some(color), Some(known)) = (color, self.colors.get_mut(name)) {
-                        *known = color.map(|x| x as f32);
+                    match (color, self.colors.get_mut(&name)) {
+                        (Some(color), Some(known)) => *known = color.map(|x| x as f32),
+                        _ => self.builder.note("a colour of a material cannot be read"),
                     }
                 }
+                (b"map_Kd", _) => self.builder.note("a texture of a material was not read"),
                 _ => {}
             }
         }
     }
 }
 
-/// Returns the first word of a line, and the rest without the spaces around it.
-fn keyword(line: &str) -> (&str, &str) {
-    let line = line.trim();
-    let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
-    (keyword, rest.trim())
+/// Returns the first word of a line, and the rest without the blanks around it.
+fn keyword(line: &[u8]) -> (&[u8], &[u8]) {
+    let line = line.trim_ascii();
+    let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
+    (&line[..end], line[end..].trim_ascii())
 }
 
-/// Parses the first `N` words as numbers; `None` if there are fewer words or one is not a number.
-fn numbers<const N: usize>(words: &str) -> Option<[f64; N]> {
-    let numbers = words.split_whitespace().take(N).map(|word| word.parse().ok());
-    numbers.collect::<Option<Vec<_>>>()?.try_into().ok()
-}
-
-/// Parses three coordinates. If exactly one more number follows, it is the weight of the vertex, by
-/// which they are divided. If several follow, they are a colour, which is ignored.
-fn position(words: &str) -> Option<[f64; 3]> {
-    let position: [f64; 3] = numbers(words)?;
-    let weight = match words.split_whitespace().count() {
-        4 => numbers::<4>(words)?[3],
-        _ => 1.0,
-    };
-    (weight != 0.0).then(|| position.map(|x| x / weight))
+/// Returns the text before a comment, which begins with `#` at the beginning or after a blank.
+fn without_comment(text: &[u8]) -> &[u8] {
+    let is_comment = |i: &usize| text[*i] == b'#' && (*i == 0 || text[i - 1].is_ascii_whitespace());
+    text[..(0..text.len()).find(is_comment).unwrap_or(text.len())].trim_ascii_end()
 }
 
 #[cfg(test)]
@@ -262,16 +320,85 @@ mod tests {
             assert_eq!(error.place, FileLocation::Line(line), "{text} {error}");
             assert!(error.found.contains(words), "{text} {error}");
         }
-        for (text, words) in [
-            ("", "no triangles"),
-            ("f 1 2 2\n", "has an area"),
-            ("mtllib ../x.mtl\nf 1 2 3\n", "mtllib"),
-        ] {
+        for (text, words) in
+            [("", "no triangles"), ("f 1 2 2\n", "has an area"), ("l 1 2 3\np 1\n", "no triangles")]
+        {
             let error = read(&format!("{v}{text}")).unwrap_err();
             assert!(error.found.contains(words), "{text} {error}");
         }
-        let notes = read(&format!("mtllib x.mtl\n{v}f 1 2 3\n")).unwrap().notes;
-        assert!(notes[0].contains("x.mtl: there is no such file"), "{notes:?}");
+    }
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+    /// Files with words and blanks as programs write them. Each has one square.
+    #[test]
+    fn obj_texts_of_programs_are_read() {
+        let whole = format!("{SQUARE}f 1 2 3 4\n");
+        for (name, text) in [
+            ("byte order mark", format!("\u{feff}{whole}")),
+            ("CRLF", whole.replace('\n', "\r\n")),
+            ("CR", whole.replace('\n', "\r")),
+            ("tabs", whole.replace(' ', "\t")),
+            ("indents and blanks at the end", whole.replace('\n', "  \n \t")),
+            ("a continued face", whole.replace("2 3", "2 \\\n  3")),
+            ("a continued face without blanks", whole.replace("2 3", "2\\\n3")),
+            ("a continued face, CRLF", whole.replace("2 3", "2\\\r\n3")),
+            ("a face continued twice", whole.replace("2 3", "\\\n2 \\ \n3")),
+            ("a continued vertex", whole.replace("v 0 0 0", "v 0 \\\n0 0")),
+            ("a path in a comment", format!("# C:\\scenes\\\n{whole}")),
+            ("comments", whole.replace('\n', " # 1 2 3\n")),
+            ("comment without a blank", whole.replace('\n', " #1\n")),
+            ("no material name", format!("usemtl\nusemtl \nmtllib\nmtllib \"\"\no\ng\n{whole}")),
+            ("an empty face", format!("{whole}f\nf \n")),
+            ("faces without surface", format!("{whole}f 1 2\nf 3\n")),
+            ("the old keyword of a face", whole.replace("f ", "fo ")),
+            ("lines", format!("{whole}l 1 2 3 4\np 1\ncurv 0 1 1 2\n")),
+            ("one texture coordinate", format!("vt 0.5\n{SQUARE}f 1/1 2/1 3/1 4/1\n")),
+            ("three texture coordinates", format!("vt 0 0 0\n{SQUARE}f 1/1 2/ 3// 4/1/\n")),
+            ("NaN in coordinates", format!("vt nan -nan(ind)\n{SQUARE}f 1/1 2/1 3/1 4/1\n")),
+            ("NaN in a normal", format!("vn -1.#IND 0 nan\n{SQUARE}f 1//1 2//1 3//1 4//1\n")),
+            ("numbers of C", whole.replace("v 1 1 0", "v 1. +1E0 -.0")),
+            ("an index from the end", whole.replace("1 2 3 4", "-4 2 -2 -1")),
+        ] {
+            let mesh = read(&text).unwrap_or_else(|e| panic!("{name}: {e}"));
+            assert_eq!(mesh.triangles.len(), 2, "{name}");
+            assert_eq!(mesh.bounds, [[0.0; 3], [1.0, 1.0, 0.0]], "{name}");
+            assert_eq!(mesh.positions[0], [0.0; 3], "{name}");
+        }
+        // The last file has the time of its length, not of its square.
+        let long = whole.replace("2 3", &format!("2 {}3", "\\\n".repeat(200_000)));
+        assert_eq!(read(&long).unwrap().triangles.len(), 2);
+    }
+
+    #[test]
+    fn obj_notes_say_what_was_left_out() {
+        for (text, note) in [
+            ("mtllib x.mtl\n", "no colours: /nowhere/x.mtl: there is no such file"),
+            ("mtllib ../x.mtl\n", "no colours: \"../x.mtl\" is not in the mesh's folder"),
+            ("f 1 2\nf 1\n", "a face of fewer than three corners was left out (2 times)"),
+            ("f 1 1 2\n", "a triangle without area was left out"),
+            ("v 0 1.5 0\nf 1 3 2 5\n", "a polygon whose outline crosses itself is uncertain"),
+            ("v 2 2 2 1 0 0\n", "a colour of a vertex was not read"),
+            ("v 2 2 2 1 0 0 1\n", "a colour of a vertex was not read"),
+            ("l 1 2 3\np 1\n", "points and lines were left out (2 times)"),
+            ("surf 0 1 0 1 1\n", "curves and free-form surfaces were left out"),
+        ] {
+            let notes = read(&format!("{SQUARE}f 1 2 3 4\n{text}")).unwrap().notes;
+            assert_eq!(notes[0], note);
+        }
+    }
+
+    #[test]
+    fn obj_polygons_may_be_concave() {
+        let text = "v 0 0 0\nv 2 1 0\nv 0 2 0\nv 0.6 1 0\nf 1 2 3 4\n";
+        let mesh = read(text).unwrap();
+        let doubled_area = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|i| glam::Vec3::from(mesh.positions[i as usize]));
+            (b - a).cross(c - a).z
+        };
+        let areas: Vec<f32> = mesh.triangles.iter().map(doubled_area).collect();
+        assert!(areas.iter().all(|area| *area > 0.0), "{areas:?}");
+        assert!((areas.iter().sum::<f32>() - 2.8).abs() < 1e-6, "{areas:?}");
     }
 
     #[test]
@@ -285,6 +412,46 @@ mod tests {
         let mesh = parse(&FileContents { path, bytes: text.into() }).unwrap();
         let colors: Vec<_> = (0..4).map(|i| mesh.color(i).unwrap()).collect();
         assert_eq!(colors, [[1.0, 0.0, 0.0], [0.5; 3], UNCOLORED, UNCOLORED]);
-        assert_eq!(mesh.notes, [] as [String; 0]);
+        let unknown = "a material that no library before it defines is white";
+        assert_eq!(mesh.notes, ["a colour of a material cannot be read", unknown]);
+    }
+
+    /// Libraries and names of materials as programs write them. The square is always red.
+    #[test]
+    fn obj_materials_of_programs_are_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let write =
+            |name: &str, text: &[u8]| std::fs::write(folder.path().join(name), text).unwrap();
+        let red = b"newmtl red\nKd 1 0 0\nmap_Kd a.png\n";
+        write("a.mtl", red);
+        write("a b.mtl", red);
+        write("other.mtl", b"newmtl x\nKd 0 0 1\n");
+        write("mark.mtl", &[b"\xEF\xBB\xBF" as &[u8], red].concat());
+        write("latin.mtl", b"newmtl r\xF6t\nKd 1 0 0\n");
+        write("blanks.mtl", b"\t newmtl \tred \r\n\tKd\t1 \\\r\n 0 0 # red\r");
+        write("sign.mtl", b"newmtl red #2\nKd 1 0 0\n");
+        for (library, material) in [
+            ("a.mtl", b"usemtl red" as &[u8]),
+            ("a.mtl", b"  usemtl\tred  \r"),
+            ("a.mtl", b"usemtl red # the first"),
+            ("a.mtl", b"usemtl \\\nred"),
+            ("a.mtl # colours", b"usemtl red"),
+            ("\"a b.mtl\"", b"usemtl red"),
+            ("a b.mtl", b"usemtl red"),
+            ("other.mtl a.mtl", b"usemtl red"),
+            ("missing.mtl\ta.mtl", b"usemtl red"),
+            (".\\a.mtl", b"usemtl red"),
+            ("mark.mtl", b"usemtl red"),
+            ("latin.mtl", b"usemtl r\xF6t"),
+            ("blanks.mtl", b"usemtl red"),
+            ("sign.mtl", b"usemtl red #2"),
+        ] {
+            let text = [b"mtllib " as &[u8], library.as_bytes(), b"\n", material, b"\n"].concat();
+            let bytes = [&text[..], SQUARE.as_bytes(), b"f 1 2 3 4\n"].concat();
+            let mesh = parse(&FileContents { path: folder.path().join("a.obj"), bytes }).unwrap();
+            assert_eq!(mesh.color(0), Some([1.0, 0.0, 0.0]), "{}", String::from_utf8_lossy(&text));
+            let has_texture = mesh.notes.contains(&"a texture of a material was not read".into());
+            assert_eq!(has_texture, !["latin.mtl", "blanks.mtl", "sign.mtl"].contains(&library));
+        }
     }
 }

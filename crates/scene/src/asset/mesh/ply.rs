@@ -1,207 +1,357 @@
-//! PLY files: positions, normals, texture coordinates and polygons, in ASCII and in binary with
-//! both byte orders.
+//! PLY files: positions, normals, texture coordinates, polygons and triangle strips, in ASCII and in
+//! binary with both byte orders. Other elements and properties are skipped, whatever their values.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::builder::Builder;
-use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{
-    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
-    ScalarType,
-};
+use crate::asset::mesh::strip;
+use crate::asset::mesh::text::{Lines, number, shown, words};
 use zerkalo_kernel::primitive::TriangleMesh;
 
-/// Number of PLY elements that the parser library parses at a time. It limits the memory for parsed
-/// elements.
-const PIECE: usize = 4096;
-
-/// Names of the eight PLY vertex properties that are read. Each property has a list of accepted
-/// names, because different programs write different names.
-const NUMBERS: [&[&str]; 8] = [
-    &["x"],
-    &["y"],
-    &["z"],
-    &["nx"],
-    &["ny"],
-    &["nz"],
-    &["u", "s", "texture_u"],
-    &["v", "t", "texture_v"],
+/// Names of the properties that are read: position, normal and texture coordinates of a vertex;
+/// vertices of a face or strip; texture coordinates of its corners. Programs write different names.
+const PROPERTIES: [&[&[u8]]; 10] = [
+    &[b"x"],
+    &[b"y"],
+    &[b"z"],
+    &[b"nx"],
+    &[b"ny"],
+    &[b"nz"],
+    &[b"u", b"s", b"texture_u"],
+    &[b"v", b"t", b"texture_v"],
+    &[b"vertex_indices", b"vertex_index"],
+    &[b"texcoord"],
 ];
+/// Indices in [`PROPERTIES`] of the two lists.
+const CORNERS: usize = 8;
+const UVS: usize = 9;
 
-/// Names of the PLY list property that holds the vertex indices of a face.
-const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
+/// Values of one vertex, face or strip, in the order of [`PROPERTIES`]; empty where it has none.
+type Record = [Vec<f64>; PROPERTIES.len()];
 
-/// One vertex or face of a PLY file, filled by the parser library. `numbers` has the properties of
-/// a vertex in the order of [`NUMBERS`]. `corners` has the vertex indices of a face.
-struct Record {
-    numbers: [f64; 8],
-    corners: Vec<u32>,
+/// Type of a number: `i`, `u` or `f` for signed, unsigned and floating-point, and the size in bytes.
+type Scalar = (u8, usize);
+
+/// Property of an element. A list begins with its length.
+struct Property {
+    /// Index in [`PROPERTIES`]; `None` if the property is not read.
+    index: Option<usize>,
+    length: Option<Scalar>,
+    scalar: Scalar,
 }
 
-impl PropertyAccess for Record {
-    fn new() -> Self {
-        Self { numbers: [0.0; 8], corners: Vec::new() }
-    }
-
-    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        let number = match value {
-            Property::Float(x) => f64::from(x),
-            Property::Double(x) => x,
-            Property::Char(x) => f64::from(x),
-            Property::UChar(x) => f64::from(x),
-            Property::Short(x) => f64::from(x),
-            Property::UShort(x) => f64::from(x),
-            Property::Int(x) => f64::from(x),
-            Property::UInt(x) => f64::from(x),
-            list => return self.set_list(name, list),
-        };
-        match NUMBERS.iter().position(|names| names.contains(&name)) {
-            Some(i) => {
-                self.numbers[i] = number;
-                PropertyAccessResult::Set
-            }
-            None => PropertyAccessResult::Ignored,
-        }
-    }
+/// Element of the header: `count` records of the same properties.
+struct Element<'a> {
+    name: &'a [u8],
+    count: usize,
+    properties: Vec<Property>,
 }
 
-impl Record {
-    fn set_list(&mut self, name: &str, list: Property) -> PropertyAccessResult {
-        if !CORNERS.contains(&name) {
-            return PropertyAccessResult::Ignored;
-        }
-        self.corners = match list {
-            Property::ListUInt(list) => list,
-            Property::ListInt(list) => indices(list),
-            Property::ListShort(list) => indices(list),
-            Property::ListChar(list) => indices(list),
-            Property::ListUShort(list) => indices(list),
-            Property::ListUChar(list) => indices(list),
-            _ => return PropertyAccessResult::UnsupportedType,
-        };
-        PropertyAccessResult::Set
+impl Element<'_> {
+    fn has(&self, index: usize) -> bool {
+        self.properties.iter().any(|p| p.index == Some(index))
     }
-}
 
-/// Converts `list` to vertex indices. Negative numbers become `u32::MAX`, an index that is out of
-/// range in every mesh.
-fn indices<T: TryInto<u32>>(list: Vec<T>) -> Vec<u32> {
-    list.into_iter().map(|index| index.try_into().unwrap_or(u32::MAX)).collect()
+    fn has_corners(&self) -> bool {
+        [b"face" as &[u8], b"tristrips"].contains(&self.name) && self.has(CORNERS)
+    }
 }
 
 /// Parses a PLY file.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
-    let parser = Parser::<Record>::new();
-    let mut reader = Reader::new(&source.bytes[..]);
-    let header = parser.read_header(&mut reader).map_err(|e| library_error(source, &e, None))?;
-    check_header(source, &header, reader.get_ref().len())?;
     let mut builder = Builder::new(source);
-    for element in header.elements.values() {
-        let has = |names: &[&str]| names.iter().any(|n| element.properties.contains_key(*n));
-        let (normals, uvs) =
-            (NUMBERS[3..6].iter().all(|n| has(n)), NUMBERS[6..].iter().all(|n| has(n)));
-        match element.name.as_str() {
-            "vertex" => builder.reserve(element.count, 0)?,
-            "face" => builder.reserve(0, element.count)?,
-            _ => {}
+    let (begin, elements) = header(source, &mut builder)?;
+    begin.check_elements(&elements)?;
+    // Faces may precede the vertices that they name.
+    let mut reader = begin.clone();
+    for element in &elements {
+        if element.name != b"vertex" {
+            reader.read(element, |_, _| Ok(()))?;
+            continue;
         }
-        let mut piece = element.clone();
-        let mut done = 0;
-        while done < element.count {
-            piece.count = PIECE.min(element.count - done);
-            let records = parser.read_payload_for_element(&mut reader, &piece, &header);
-            let records = records.map_err(|e| {
-                let byte = source.bytes.len() - reader.get_ref().len();
-                library_error(source, &e, (header.encoding != Encoding::Ascii).then_some(byte))
-            })?;
-            for (i, record) in records.iter().enumerate() {
-                match element.name.as_str() {
-                    "vertex" => {
-                        let [x, y, z, ref others @ ..] = record.numbers;
-                        let [nx, ny, nz, u, v] = others.map(|number| number as f32);
-                        let normal = normals.then_some([nx, ny, nz]);
-                        builder.vertex([x, y, z], normal, uvs.then_some([u, v]));
-                    }
-                    "face" => {
-                        let place = || FileLocation::Part(format!("face {} (from 0)", done + i));
-                        builder.polygon(&record.corners, place)?;
-                    }
-                    _ => {}
-                }
-            }
-            done += piece.count;
+        builder.reserve(element.count, 0)?;
+        reader.read(element, |_, record| {
+            let [x, y, z, nx, ny, nz, u, v] = std::array::from_fn(|i| record[i].first().copied());
+            let position = [x, y, z].map(|x| x.unwrap_or(f64::NAN));
+            let single = |x: Option<f64>| x.map(|x| x as f32);
+            let normal = || Some([single(nx)?, single(ny)?, single(nz)?]);
+            builder.vertex(position, normal(), single(u).zip(single(v)).map(|(u, v)| [u, v]));
+            Ok(())
+        })?;
+        break;
+    }
+    let mut reader = begin;
+    for element in &elements {
+        match element.has_corners() {
+            true => add_faces(&mut reader, element, &mut builder)?,
+            false => reader.read(element, |_, _| Ok(()))?,
         }
     }
     builder.finish()
 }
 
-/// Converts an error of the PLY parser library to an error with file and location. `byte` is the
-/// offset of the error in a binary file; `None` for a text file.
-fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>) -> AssetError {
-    let place = match (byte, error.line()) {
-        (Some(byte), _) => FileLocation::Byte(byte),
-        (None, Some(line)) => FileLocation::Line(line),
-        (None, None) => FileLocation::Whole,
-    };
-    let message = error.to_string();
-    // The first line of the message states the error; the other lines repeat the input.
-    let first = message.lines().next().unwrap_or_default();
-    let first =
-        first.split_once(": ").filter(|(l, _)| l.starts_with("Line ")).map_or(first, |p| p.1);
-    source.error(place, first.trim_end_matches(['.', ':']), "a PLY file")
+/// Reads the faces or strips of `element` and adds their triangles.
+fn add_faces(
+    reader: &mut Reader,
+    element: &Element,
+    builder: &mut Builder,
+) -> Result<(), AssetError> {
+    builder.reserve(0, element.count)?;
+    let is_strip = element.name == b"tristrips";
+    let mut corners = Vec::new();
+    reader.read(element, |n, record| {
+        let place = || FileLocation::Part(format!("{} {n} (from 0)", shown(element.name)));
+        // In strips, -1 ends a strip and begins the next one.
+        for indices in record[CORNERS].split(|i| is_strip && *i < 0.0) {
+            corners.clear();
+            for index in indices {
+                corners.push(builder.index(*index, 0, place)?);
+            }
+            if !is_strip {
+                for (corner, uv) in corners.iter_mut().zip(record[UVS].as_chunks().0) {
+                    *corner = builder.with_uv(*corner, uv.map(|x| x as f32));
+                }
+                builder.polygon(&corners)?;
+                continue;
+            }
+            for i in 2..corners.len() {
+                let [a, b, c] = strip(i - 2).map(|i| corners[i]);
+                // Strips repeat corners to continue elsewhere.
+                if a != b && b != c && c != a {
+                    builder.triangle([a, b, c])?;
+                }
+            }
+        }
+        Ok(())
+    })
 }
 
-/// Checks that a PLY header declares the required elements and properties, and that `left`, the
-/// number of bytes after the header, suffices for the declared elements.
-fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(), AssetError> {
-    let missing = |what: &str| Err(source.fault(format!("the header names no {what}"), "a mesh"));
-    let Some(vertex) = header.elements.get("vertex") else { return missing("element vertex") };
-    for names in &NUMBERS[..3] {
-        if !vertex.properties.contains_key(names[0]) {
-            return missing(&format!("property {} of vertices", names[0]));
+/// Parses the header. Returns a reader of the bytes after it, and the elements up to the last one
+/// that is read.
+fn header<'a>(
+    source: &'a FileContents,
+    builder: &mut Builder,
+) -> Result<(Reader<'a>, Vec<Element<'a>>), AssetError> {
+    let mut lines = Lines::new(&source.bytes);
+    let mut encoding = None;
+    let mut elements: Vec<Element> = Vec::new();
+    loop {
+        let Some((line, text)) = lines.next() else {
+            return Err(source.fault("the header does not end", "a line end_header"));
+        };
+        let words: Vec<_> = words(text).take(6).collect();
+        let mut add = || {
+            match words[..] {
+                [b"ply"] if line == 1 => {}
+                _ if line == 1 => return None,
+                [b"format", b"ascii", ..] => encoding = Some(Encoding::Ascii),
+                [b"format", b"binary_little_endian", ..] => encoding = Some(Encoding::LittleEndian),
+                [b"format", b"binary_big_endian", ..] => encoding = Some(Encoding::BigEndian),
+                [b"element", name, count] => {
+                    let count = std::str::from_utf8(count).ok()?.parse().ok()?;
+                    elements.push(Element { name, count, properties: Vec::new() });
+                }
+                [b"property", ref rest @ ..] => {
+                    let (property, name) = property(rest)?;
+                    elements.last_mut()?.properties.push(property);
+                    if [b"red" as &[u8], b"r", b"diffuse_red"].contains(&name) {
+                        builder.note("the colours of vertices or faces were not read");
+                    }
+                }
+                [b"comment", b"TextureFile", ..] => builder.note("a texture was not read"),
+                [] | [b"comment" | b"obj_info" | b"end_header", ..] => {}
+                _ => return None,
+            }
+            Some(())
+        };
+        add().ok_or_else(|| {
+            let found = format!("the header has the line \"{}\"", shown(text));
+            source.error(FileLocation::Line(line), found, "a line of the PLY format")
+        })?;
+        if words.first() == Some(&&b"end_header"[..]) {
+            break;
         }
     }
-    let Some(face) = header.elements.get("face") else { return missing("element face") };
-    if !CORNERS.iter().any(|name| face.properties.contains_key(*name)) {
-        return missing("list vertex_indices of faces");
+    let is_read = |e: &Element| e.name == b"vertex" || e.has_corners();
+    elements.truncate(elements.iter().rposition(is_read).map_or(0, |last| last + 1));
+    let encoding = encoding.ok_or_else(|| source.fault("the header names no format", "ascii"))?;
+    // Where lines end with CR, the next byte is the first one of the elements, even if it is LF.
+    let begin = source.bytes.len() - lines.rest.len();
+    if source.bytes[..begin].ends_with(b"\r\n") && !source.bytes[..begin - 1].contains(&b'\n') {
+        lines.rest = &source.bytes[begin - 1..];
     }
-    let order = |name| header.elements.get_index_of(name);
-    if order("face") < order("vertex") {
-        return Err(source.fault("the faces precede the vertices", "vertices first"));
-    }
-    let mut least = 0u128;
-    for element in header.elements.values() {
-        let bytes = least_bytes(element, header.encoding);
-        if bytes == 0 && element.count > 0 {
-            let found = format!("the element {} has no properties", element.name);
-            return Err(source.fault(found, "at least one"));
-        }
-        least += bytes as u128 * element.count as u128;
-        if least > left as u128 + 1 {
-            let found = format!(
-                "the header declares {} times {}, more than the file holds",
-                element.count, element.name
-            );
-            return Err(source.fault(found, "as many as there are"));
-        }
-    }
-    Ok(())
+    Ok((Reader { source, encoding, lines, number: 0, line: b"" }, elements))
 }
 
-/// Returns the smallest number of bytes that an element (vertex or face) takes in a PLY file with
-/// the given encoding. In an ASCII file each property needs at least a digit and a separator.
-fn least_bytes(element: &ElementDef, encoding: Encoding) -> usize {
-    let size = |scalar: &ScalarType| match scalar {
-        _ if encoding == Encoding::Ascii => 2,
-        ScalarType::Char | ScalarType::UChar => 1,
-        ScalarType::Short | ScalarType::UShort => 2,
-        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
-        ScalarType::Double => 8,
+/// Parses the words after `property`, and returns the property with its name; `None` if they are
+/// wrong.
+fn property<'a>(words: &[&'a [u8]]) -> Option<(Property, &'a [u8])> {
+    let (length, words) = match words {
+        [b"list", length, rest @ ..] => (Some(scalar(length)?), rest),
+        all => (None, all),
     };
-    let least = |p: &PropertyType| match p {
-        PropertyType::Scalar(scalar) | PropertyType::List(scalar, _) => size(scalar),
-    };
-    element.properties.values().map(|p| least(&p.data_type)).sum()
+    let [kind, name, ..] = words else { return None };
+    let index = PROPERTIES.iter().position(|names| names.contains(name));
+    let index = index.filter(|index| length.is_some() == (*index >= CORNERS));
+    Some((Property { index, length, scalar: scalar(kind)? }, name))
+}
+
+fn scalar(name: &[u8]) -> Option<Scalar> {
+    Some(match name {
+        b"char" | b"int8" => (b'i', 1),
+        b"uchar" | b"uint8" => (b'u', 1),
+        b"short" | b"int16" => (b'i', 2),
+        b"ushort" | b"uint16" => (b'u', 2),
+        b"int" | b"int32" => (b'i', 4),
+        b"uint" | b"uint32" => (b'u', 4),
+        b"long" | b"int64" => (b'i', 8),
+        b"ulong" | b"uint64" => (b'u', 8),
+        b"float" | b"float32" => (b'f', 4),
+        b"double" | b"float64" => (b'f', 8),
+        _ => return None,
+    })
+}
+
+/// Encoding of the elements.
+#[derive(Clone, Copy, PartialEq)]
+enum Encoding {
+    Ascii,
+    LittleEndian,
+    BigEndian,
+}
+
+/// Reader of the elements after the header.
+#[derive(Clone)]
+struct Reader<'a> {
+    source: &'a FileContents,
+    encoding: Encoding,
+    /// Bytes that were not read, in an ASCII file those after the present line.
+    lines: Lines<'a>,
+    /// Number of the present line of an ASCII file, and the rest of it.
+    number: usize,
+    line: &'a [u8],
+}
+
+impl<'a> Reader<'a> {
+    /// Checks that the header declares the required elements and properties, and that the file is
+    /// long enough for the declared elements.
+    fn check_elements(&self, elements: &[Element]) -> Result<(), AssetError> {
+        let missing =
+            |what: &str| Err(self.source.fault(format!("the header names no {what}"), "a mesh"));
+        let Some(vertex) = elements.iter().find(|e| e.name == b"vertex") else {
+            return missing("element vertex");
+        };
+        if let Some(i) = (0..3).find(|i| !vertex.has(*i)) {
+            return missing(&format!("property {} of vertices", ["x", "y", "z"][i]));
+        }
+        if !elements.iter().any(Element::has_corners) {
+            return missing("element face or tristrips with a list vertex_indices");
+        }
+        let mut least = 0u128;
+        for Element { name, count, properties } in elements {
+            // In an ASCII file each property needs at least a digit and a separator.
+            let bytes = |p: &Property| match self.encoding {
+                Encoding::Ascii => 2,
+                Encoding::LittleEndian | Encoding::BigEndian => p.length.unwrap_or(p.scalar).1,
+            };
+            least += properties.iter().map(bytes).sum::<usize>() as u128 * *count as u128;
+            if least > self.lines.rest.len() as u128 + 1 {
+                let found = format!("the header declares {count} times {}", shown(name));
+                let found = found + ", more than the file holds";
+                return Err(self.source.fault(found, "as many as there are"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads all records of `element`. Passes each with its number to `add`. In an ASCII file each
+    /// record begins on a new line; words after its last value are ignored.
+    fn read(
+        &mut self,
+        element: &Element,
+        mut add: impl FnMut(usize, &Record) -> Result<(), AssetError>,
+    ) -> Result<(), AssetError> {
+        let mut record = Record::default();
+        // A record without properties takes no bytes.
+        let count = if element.properties.is_empty() { 0 } else { element.count };
+        for n in 0..count {
+            self.line = b"";
+            record.iter_mut().for_each(Vec::clear);
+            for Property { index, length, scalar } in &element.properties {
+                let length = length.map_or(Ok(1), |length| self.length(length))?;
+                for _ in 0..length {
+                    // Values that are not read may be any words.
+                    match index {
+                        Some(index) => record[*index].push(self.value(*scalar)?),
+                        None => drop(self.bytes(scalar.1)?),
+                    }
+                }
+            }
+            add(n, &record)?;
+        }
+        Ok(())
+    }
+
+    fn error(&self, found: impl Into<String>, expected: &str) -> AssetError {
+        let place = match self.encoding {
+            Encoding::Ascii => FileLocation::Line(self.number),
+            Encoding::LittleEndian | Encoding::BigEndian => {
+                FileLocation::Byte(self.source.bytes.len() - self.lines.rest.len())
+            }
+        };
+        self.source.error(place, found, expected)
+    }
+
+    /// Reads the length of a list, and checks that the file is long enough for it.
+    fn length(&mut self, scalar: Scalar) -> Result<usize, AssetError> {
+        let length = self.value(scalar)?;
+        let left = self.line.len() + self.lines.rest.len();
+        (0.0..=left as f64).contains(&length).then_some(length as usize).ok_or_else(|| {
+            let found = format!("a list has {length} values, more than the file holds");
+            self.error(found, "as many as there are")
+        })
+    }
+
+    fn value(&mut self, (kind, size): Scalar) -> Result<f64, AssetError> {
+        let bytes = self.bytes(size)?;
+        let append = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
+        let bits = match self.encoding {
+            Encoding::Ascii => {
+                let wrong =
+                    || self.error(format!("\"{}\" is not a number", shown(bytes)), "a number");
+                return number(bytes).ok_or_else(wrong);
+            }
+            Encoding::LittleEndian => bytes.iter().rev().fold(0, append),
+            Encoding::BigEndian => bytes.iter().fold(0, append),
+        };
+        let unused = 64 - 8 * size;
+        Ok(match (kind, size) {
+            (b'f', 4) => f64::from(f32::from_bits(bits as u32)),
+            (b'f', _) => f64::from_bits(bits),
+            (b'i', _) => ((bits << unused) as i64 >> unused) as f64,
+            _ => bits as f64,
+        })
+    }
+
+    /// Returns the bytes of the next value: `size` bytes, in an ASCII file a word.
+    fn bytes(&mut self, size: usize) -> Result<&'a [u8], AssetError> {
+        let ends = |reader: &Self| reader.error("the file ends in an element", "a whole file");
+        if self.encoding != Encoding::Ascii {
+            let split = self.lines.rest.split_at_checked(size);
+            let (bytes, rest) = split.ok_or_else(|| ends(self))?;
+            self.lines.rest = rest;
+            return Ok(bytes);
+        }
+        while self.line.trim_ascii_start().is_empty() {
+            let next = self.lines.next();
+            (self.number, self.line) = next.ok_or_else(|| ends(self))?;
+        }
+        let line = self.line.trim_ascii_start();
+        let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
+        let (word, rest) = line.split_at(end);
+        self.line = rest;
+        Ok(word)
+    }
 }
 
 #[cfg(test)]
@@ -271,12 +421,12 @@ mod tests {
             (
                 header("ascii", "4", "1") + &TEXT.replace("4 0 1 2 3", "4 0 1 2 -3"),
                 FileLocation::Part("face 0 (from 0)".into()),
-                "vertex 4294967295",
+                "vertex -3",
             ),
             (
                 header("ascii", "4", "1") + &TEXT.replace("1 1 0 1 1", "1 x 0 1 1"),
                 FileLocation::Line(16),
-                "Couldn't",
+                "\"x\" is not a number",
             ),
             (header("ascii", "4", "0") + TEXT, FileLocation::Whole, "no triangles"),
             (
@@ -289,17 +439,203 @@ mod tests {
                 FileLocation::Whole,
                 "no element vertex",
             ),
+            ("plx\n".into(), FileLocation::Line(1), "the line \"plx\""),
+            ("ply\nformat ascii 1.0\n".into(), FileLocation::Whole, "does not end"),
+            ("ply\nformat text 1.0\n".into(), FileLocation::Line(2), "format text"),
+            ("ply\nproperty int x\n".into(), FileLocation::Line(2), "property int x"),
             (
-                header("ascii", "4", "1").replace("end_header", "element n 4000000000\nend_header")
-                    + TEXT,
-                FileLocation::Whole,
-                "no properties",
+                header("ascii", "4", "1") + &TEXT.replace("4 0 1", "400 0 1"),
+                FileLocation::Line(18),
+                "a list has 400 values",
             ),
-            ("plx\n".into(), FileLocation::Line(1), "magic"),
+            (
+                header("ascii", "4", "1") + &TEXT.replace(" 255\n", ""),
+                FileLocation::Line(18),
+                "the file ends",
+            ),
         ] {
             let error = read(text.as_bytes()).unwrap_err();
             assert!(error.found.contains(words), "{error}");
             assert_eq!(error.place, place, "{error}");
+        }
+    }
+
+    const SQUARE: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+                          property float z\nelement face 1\nproperty list uchar int vertex_indices\n\
+                          end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
+
+    /// ASCII files as programs write them: changes of a square that keep its shape.
+    #[test]
+    fn ply_texts_of_programs_are_read() {
+        let with = |property: &str, value: &str| {
+            let text = SQUARE.replacen("element face", &format!("{property}\nelement face"), 1);
+            text.replace(" 0\n", &format!(" 0 {value}\n"))
+        };
+        let (head, body) = SQUARE.split_once("end_header\n").unwrap();
+        let faces_first =
+            SQUARE.replace("element face 1\nproperty list uchar int vertex_indices\n", "");
+        let faces_first = faces_first.replace(
+            "element vertex",
+            "element face 1\nproperty list int uint64 vertex_index\nelement vertex",
+        );
+        let faces_first = faces_first.replace("\n4 0 1 2 3", "");
+        let faces_first = faces_first.replace("end_header\n", "end_header\n4 0 1 2 3\n");
+        for (name, text) in [
+            ("as it should be", SQUARE.to_string()),
+            ("byte order mark", format!("\u{feff}{SQUARE}")),
+            ("CRLF", SQUARE.replace('\n', "\r\n")),
+            ("CR", SQUARE.replace('\n', "\r")),
+            ("blank lines", format!("{head}\n \nend_header\n\n{}", body.replace('\n', "\n \t\n"))),
+            ("tabs and indents", format!("{head}end_header\n\t{}", body.replace(' ', " \t"))),
+            (
+                "a record on several lines",
+                format!("{head}end_header\n{}", body.replace("1 1 0", "1\n1\n0")),
+            ),
+            ("words after a record", SQUARE.replace("1 1 0", "1 1 0 7 x")),
+            ("numbers of C", SQUARE.replace("\n1 1 0", "\n1. +1e0 -.0").replace("4 0", "4.0 0.")),
+            (
+                "NaN in normals",
+                with(
+                    "property float nx\nproperty float ny\nproperty float nz",
+                    "nan -nan(ind) 1.#IND",
+                ),
+            ),
+            ("infinity", with("property float quality", "-inf")),
+            ("no number", with("property float quality", "none")),
+            ("a name with a number sign", with("property float scalar_#2", "1")),
+            ("a name with brackets", with("property float scalar_(m)", "1")),
+            ("a name with blanks", with("property float scalar field (m)", "1")),
+            ("a name that is not ASCII", with("property float \u{f6}", "1")),
+            ("a float for an integer", with("property uchar alpha", "255.0")),
+            (
+                "64 bits",
+                with(
+                    "property int64 id\nproperty uint64 key",
+                    "-9223372036854775808 18446744073709551615",
+                ),
+            ),
+            ("an unread list", with("property list uchar float weights", "2 0.5 x")),
+            ("an empty list", with("property list uchar float weights", "0")),
+            (
+                "other type names",
+                SQUARE.replace("float", "float64").replace("uchar int", "uint8 int16"),
+            ),
+            ("NaN in texture coordinates", with("property float s\nproperty float t", "nan inf")),
+            ("faces first", faces_first),
+            (
+                "an element before",
+                SQUARE
+                    .replace("element vertex", "element camera 1\nproperty float f\nelement vertex")
+                    .replace("end_header\n", "end_header\n35\n"),
+            ),
+            (
+                "a faulty element after",
+                SQUARE.replace("end_header", "element edge 5\nproperty int a\nend_header"),
+            ),
+            (
+                "no properties",
+                SQUARE.replace("element face", "element nothing 4000000000\nelement face"),
+            ),
+            (
+                "a strip",
+                SQUARE
+                    .replace("face 1", "tristrips 1")
+                    .replace("4 0 1 2 3", "6 0 1 3 2 2 2")
+                    .replace("uchar int", "int int"),
+            ),
+            (
+                "two strips",
+                SQUARE
+                    .replace("face 1", "tristrips 1")
+                    .replace("4 0 1 2 3", "7 0 1 2 -1 0 2 3")
+                    .replace("uchar int", "int int"),
+            ),
+        ] {
+            let mesh = read(text.as_bytes()).unwrap_or_else(|e| panic!("{name}: {e}"));
+            assert_eq!(mesh.triangles.len(), 2, "{name}");
+            let normal = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(|i| glam::Vec3::from(mesh.positions[i as usize]));
+                (b - a).cross(c - a).to_array()
+            };
+            assert!(mesh.triangles.iter().all(|t| normal(t) == [0.0, 0.0, 1.0]), "{name}");
+            assert_eq!(mesh.bounds, [[0.0; 3], [1.0, 1.0, 0.0]], "{name}");
+        }
+        let mut latin = SQUARE.as_bytes().to_vec();
+        latin.splice(4..4, *b"comment Gr\xF6\xDFe\nobj_info \xFF\n");
+        assert_eq!(read(&latin).unwrap().triangles.len(), 2);
+    }
+
+    #[test]
+    fn ply_binary_types_are_read() {
+        const TYPES: [(&str, usize); 8] = [
+            ("char", 1),
+            ("uint8", 1),
+            ("short", 2),
+            ("ushort", 2),
+            ("int32", 4),
+            ("uint", 4),
+            ("int64", 8),
+            ("uint64", 8),
+        ];
+        let integers = TYPES.iter().flat_map(|(name, size)| {
+            ["\n", "\r\n", "\r"].map(|end| (*name, *size, end, name.contains('u')))
+        });
+        for (name, size, end, is_unsigned) in integers {
+            for format in ["binary_little_endian", "binary_big_endian"] {
+                let head = SQUARE.split_once("end_header").unwrap().0.replace("ascii", format);
+                let head =
+                    head.replace("float", name).replace("uchar int", &format!("{name} {name}"));
+                let mut bytes = format!("{head}end_header\n").replace('\n', end).into_bytes();
+                // The first byte of the data looks like the end of a line.
+                let least = if is_unsigned { 10 } else { -3 };
+                let far = if size == 1 { 10 } else { 0x0A0A };
+                let corners = [[far, 10, 10], [far, least, 0], [100, 100, 100], [0, 100, 0]];
+                for x in corners.into_iter().flatten().chain([4, 0, 1, 2, 3]) {
+                    let number = i64::from(x).to_le_bytes();
+                    let mut number = number[..size].to_vec();
+                    if format.contains("big") {
+                        number.reverse();
+                    }
+                    bytes.extend(number);
+                }
+                let mesh = read(&bytes).unwrap_or_else(|e| panic!("{name} {format} {end:?}: {e}"));
+                let expected = corners.map(|p| p.map(|x| x as f32));
+                assert_eq!(mesh.positions, expected, "{name} {format} {end:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn ply_texture_coordinates_of_corners_are_kept() {
+        let text = SQUARE.replace("end_header", "property list uchar float texcoord\nend_header");
+        let text = text.replace("face 1", "face 3");
+        let faces = "4 0 1 2 3 8 0 0 1 0 1 1 0 1\n3 0 1 2 6 0 0 0.5 0 1 1\n3 0 2 3 0\n";
+        let mesh = read(text.replace("4 0 1 2 3\n", faces).as_bytes()).unwrap();
+        let uvs = mesh.uvs.unwrap();
+        let of = |t: &[u32; 3]| t.map(|i| uvs[i as usize]);
+        let found: Vec<_> = mesh.triangles.iter().map(of).collect();
+        assert_eq!(found[0], [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+        assert_eq!(found[1], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+        assert_eq!(found[2], [[0.0, 0.0], [0.5, 0.0], [1.0, 1.0]]);
+        assert_eq!(found[3], [[0.0; 2]; 3]);
+    }
+
+    #[test]
+    fn ply_notes_say_what_was_left_out() {
+        for (old, new, note) in [
+            (
+                "element face",
+                "property uchar red\nelement face",
+                "the colours of vertices or faces were not read",
+            ),
+            (
+                "element vertex",
+                "comment TextureFile a.png\nelement vertex",
+                "a texture was not read",
+            ),
+        ] {
+            let text = SQUARE.replace(old, new).replace(" 0\n", " 0 0\n");
+            assert_eq!(read(text.as_bytes()).unwrap().notes, [note]);
         }
     }
 

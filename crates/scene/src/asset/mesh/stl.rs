@@ -1,10 +1,12 @@
-//! STL files, ASCII and binary. Triangles in this format share no vertices. This module merges
+//! STL files, ASCII with any number of solids, and binary. Triangles in this format share no vertices. This module merges
 //! vertices with equal positions, so that normals can be smooth. The normals in the file are
-//! ignored, because they follow from the corners.
+//! ignored, because they follow from the corners. Colours, which some programs write into the
+//! attributes of binary files, are not read.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::builder::Builder;
+use crate::asset::mesh::text::{Lines, number, words};
 use std::collections::HashMap;
 use zerkalo_kernel::primitive::TriangleMesh;
 
@@ -12,6 +14,8 @@ use zerkalo_kernel::primitive::TriangleMesh;
 const HEADER: usize = 84;
 /// Number of bytes of a triangle in a binary STL file.
 const TRIANGLE: usize = 50;
+/// Number of bytes at the beginning in which a binary file has a zero.
+const SAMPLE: usize = 512;
 
 /// Parses an STL file.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
@@ -21,8 +25,10 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let size = announced.map(|count| HEADER as u64 + TRIANGLE as u64 * u64::from(count));
     let length = source.bytes.len() as u64;
     // Some binary files begin with `solid` like a text file.
-    let has_zeros = source.bytes.iter().take(HEADER).any(|byte| *byte == 0);
-    if source.bytes.starts_with(b"solid") && size != Some(length) && !has_zeros {
+    let has_zeros = source.bytes.iter().take(SAMPLE).any(|byte| *byte == 0);
+    let first = Lines::new(&source.bytes).find_map(|(_, line)| words(line).next());
+    let is_text = first.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    if is_text && size != Some(length) && !has_zeros {
         parser.parse_text()?;
         return parser.builder.finish();
     }
@@ -47,30 +53,44 @@ struct Parser<'a> {
 }
 
 impl Parser<'_> {
-    /// Adds the triangles of an ASCII file. Normals and names are ignored.
+    /// Adds the triangles of an ASCII file. Normals and names are ignored. Words may be in any case
+    /// and on any line, and `end` may be a word of its own.
     fn parse_text(&mut self) -> Result<(), AssetError> {
         let mut corners: Vec<[f32; 3]> = Vec::new();
-        for (line, number) in self.source.bytes.split(|byte| *byte == b'\n').zip(1..) {
-            let line = String::from_utf8_lossy(line);
-            let mut words = line.split_whitespace();
-            let wrong = |found: &str| {
-                self.source.error(FileLocation::Line(number), found, "a line of the STL format")
-            };
-            match words.next() {
-                Some("vertex") => {
-                    let numbers = words.map(|word| word.parse().ok()).collect::<Option<Vec<_>>>();
-                    let corner = numbers.and_then(|numbers| numbers.try_into().ok());
-                    let wrong = || wrong("this vertex is not three numbers");
-                    corners.push(corner.ok_or_else(wrong)?);
+        for (line, text) in Lines::new(&self.source.bytes) {
+            let text = text.to_ascii_lowercase();
+            let mut words = words(&text).peekable();
+            while let Some(word) = words.next() {
+                let wrong = |found: &str| {
+                    self.source.error(FileLocation::Line(line), found, "a line of the STL format")
+                };
+                let word = if word == b"end" { words.next().unwrap_or(b"solid") } else { word };
+                match word {
+                    b"vertex" => {
+                        let mut next = || Some(number(words.next()?)? as f32);
+                        let corner = (|| Some([next()?, next()?, next()?]))();
+                        let wrong = || wrong("this vertex is not three numbers");
+                        corners.push(corner.ok_or_else(wrong)?);
+                    }
+                    b"endfacet" | b"facet" if !corners.is_empty() => {
+                        let Ok(triangle) = std::mem::take(&mut corners).try_into() else {
+                            return Err(wrong("this facet does not have three corners"));
+                        };
+                        self.add(triangle, || FileLocation::Line(line))?;
+                    }
+                    b"normal" => {
+                        words.by_ref().take(3).for_each(drop);
+                    }
+                    // A name may have the word `facet`, but no `normal` after it.
+                    b"solid" | b"endsolid" => {
+                        let facet: [&[u8]; 2] = [b"facet", b"normal"];
+                        while words.peek().is_some() && !words.clone().take(2).eq(facet) {
+                            words.next();
+                        }
+                    }
+                    b"facet" | b"outer" | b"loop" | b"endloop" | b"endfacet" => {}
+                    _ => return Err(wrong("this line cannot be read")),
                 }
-                Some("endfacet") => {
-                    let Ok(triangle) = std::mem::take(&mut corners).try_into() else {
-                        return Err(wrong("this facet does not have three corners"));
-                    };
-                    self.add(triangle, || FileLocation::Line(number))?;
-                }
-                Some("solid" | "facet" | "outer" | "endloop" | "endsolid") | None => {}
-                Some(_) => return Err(wrong("this line cannot be read")),
             }
         }
         match corners.is_empty() {
@@ -83,6 +103,10 @@ impl Parser<'_> {
         self.builder.check_limits(0, count)?;
         let triangles = self.source.bytes[HEADER..].chunks_exact(TRIANGLE).take(count);
         for (n, bytes) in triangles.enumerate() {
+            // VisCAM marks a colour by the highest bit of the attribute.
+            if bytes[49] & 0x80 != 0 {
+                self.builder.note("a colour of a triangle was not read");
+            }
             // The first three numbers are the normal.
             let numbers = bytes[12..48].as_chunks().0.iter().map(|b| f32::from_le_bytes(*b));
             let numbers: Vec<f32> = numbers.collect();
@@ -108,7 +132,7 @@ impl Parser<'_> {
             let vertex = || self.builder.vertex(position.map(f64::from), None, None);
             *self.known.entry(key).or_insert_with(vertex)
         });
-        self.builder.triangle(corners, place)
+        self.builder.triangle(corners)
     }
 }
 
@@ -148,6 +172,55 @@ mod tests {
         );
         assert_eq!(read(&bytes).unwrap(), text);
         assert_eq!(text.positions.len(), 4);
+    }
+
+    /// ASCII files as programs write them, each with one triangle per solid.
+    #[test]
+    fn stl_texts_of_programs_are_read() {
+        let whole = format!("solid a\n{FACET}endsolid a\n");
+        let line = whole.replace('\n', " ");
+        for (name, text, triangles) in [
+            ("as it should be", whole.clone(), 1),
+            ("two solids", whole.repeat(2), 2),
+            ("an empty solid before", format!("solid e\nendsolid e\n{whole}"), 1),
+            ("upper case", whole.to_uppercase(), 1),
+            ("mixed case", whole.replace("facet", "Facet").replace("outer", "OuTer"), 1),
+            ("space before", format!("\n \t{whole}"), 1),
+            ("byte order mark", format!("\u{feff}{whole}"), 1),
+            ("no name", whole.replace(" a\n", "\n"), 1),
+            ("a name like words", whole.replace("solid a", "solid vertex facet end 1"), 1),
+            ("no endsolid", format!("solid a\n{FACET}"), 1),
+            ("two words", whole.replace("end", "end "), 1),
+            ("no endfacet", whole.replace("endfacet\n", "") + FACET, 2),
+            ("CRLF", whole.replace('\n', "\r\n"), 1),
+            ("CR", whole.replace('\n', "\r"), 1),
+            ("one line", line.clone(), 1),
+            ("one line for two", line.repeat(2), 2),
+            (
+                "a facet in a line",
+                whole.replace("\nouter", " outer").replace("\nvertex", " vertex"),
+                1,
+            ),
+            ("NaN in a normal", whole.replace("0 0 1", "nan -nan(ind) 1.#IND"), 1),
+            ("indents", whole.replace('\n', "\n\t  "), 1),
+            ("numbers of C", whole.replace("1 0 0", "+1. .0E+00 -0e-3"), 1),
+        ] {
+            let mesh = read(text.as_bytes()).unwrap_or_else(|e| panic!("{name}: {e}"));
+            assert_eq!(mesh.triangles.len(), triangles, "{name}");
+            assert_eq!(mesh.positions[1], [1.0, 0.0, 0.0], "{name}");
+        }
+        let mut latin = whole.into_bytes();
+        latin.splice(6..7, *b"K\xF6rper");
+        assert_eq!(read(&latin).unwrap().triangles.len(), 1);
+    }
+
+    #[test]
+    fn stl_colors_are_noted() {
+        let mut bytes =
+            binary(&[[0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]; 2], 2);
+        assert_eq!(read(&bytes).unwrap().notes, [] as [String; 0]);
+        bytes[133] = 0xFC;
+        assert_eq!(read(&bytes).unwrap().notes, ["a colour of a triangle was not read"]);
     }
 
     #[test]
