@@ -190,17 +190,21 @@ impl<'a> Builder<'a> {
 
     /// Adds a polygon of any shape in a plane as triangles.
     pub fn polygon(&mut self, corners: &[u32]) -> Result<(), AssetError> {
-        if corners.len() < 3 {
-            self.note("a face of fewer than three corners was left out");
-        }
-        let divided = (corners.len() > 3).then(|| {
-            let position = |i: &u32| DVec3::from(self.positions[*i as usize]);
-            polygon::divide(&corners.iter().map(position).collect::<Vec<_>>())
-        });
-        if let Some(division) = divided.flatten() {
-            if !division.is_exact {
-                self.note("a polygon whose outline crosses itself is uncertain");
+        let position = |i: &u32| DVec3::from(self.positions[*i as usize]);
+        let division = match corners.len() {
+            0..=2 => {
+                self.note("a face of fewer than three corners was left out");
+                None
             }
+            4..=polygon::MAX_CORNERS => {
+                polygon::divide(&corners.iter().map(position).collect::<Vec<_>>())
+            }
+            _ => None,
+        };
+        if corners.len() > polygon::MAX_CORNERS || division.as_ref().is_some_and(|d| !d.is_exact) {
+            self.note("a polygon whose outline crosses itself or is too long is uncertain");
+        }
+        if let Some(division) = division {
             for triangle in division.triangles {
                 self.triangle(triangle.map(|i| corners[i]))?;
             }

@@ -1,251 +1,579 @@
 //! glTF 2.0 files, text and binary. All primitives are merged into one mesh, with the transforms of
-//! their nodes applied. Positions, normals, texture coordinates and base colour factors are read.
-//! Cameras, lights, images, animations, skins and morph targets are ignored.
-//!
-//! The `gltf` library parses and validates the JSON. This module reads the numbers in the buffers
-//! itself. The iterators of the library trust the offsets and types in the file; if the file is
-//! wrong, they panic or their arithmetic overflows.
+//! their nodes, skins, morph weights and instances applied. Positions, normals, texture coordinates
+//! and base colour factors are read, from quantised and sparse accessors, too. Everything else is
+//! ignored, even if it is faulty.
+
+mod document;
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES};
 use crate::asset::mesh::builder::Builder;
+use crate::asset::mesh::gltf::document::{
+    Attributes, Document, Instances, Material, Node, Primitive, Sparse, View, whole,
+};
 use crate::asset::mesh::strip;
+use crate::process_memory::missing_memory;
 use crate::value::truncated;
 use base64::Engine;
-use glam::{DAffine3, DMat4, DVec3};
-use gltf::accessor::{DataType, Dimensions};
-use gltf::mesh::Mode;
-use gltf::{Accessor, Document, Gltf, Node, Primitive, Semantic};
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use glam::{DAffine3, DMat4, DQuat, DVec3};
 use std::borrow::Cow;
+use std::cell::{Cell, OnceCell};
+use std::collections::HashSet;
+use std::fmt::{Arguments, Display};
 use zerkalo_kernel::primitive::TriangleMesh;
+
+/// Parts of the names of extensions that change neither the shape nor the colours that are read.
+const HARMLESS: [&str; 7] =
+    ["_materials_", "_texture_", "_lights_", "_xmp", "_animation_", "_features", "_metadata"];
+
+/// Extensions that are applied, or refused where they occur.
+const KNOWN: [&str; 5] = [
+    "KHR_mesh_quantization",
+    "EXT_mesh_gpu_instancing",
+    "KHR_draco_mesh_compression",
+    "EXT_meshopt_compression",
+    "KHR_meshopt_compression",
+];
+
+/// Largest number of items of lists and accessors that are read in all, with repetitions: a few for
+/// each vertex and triangle of the largest mesh. It bounds the time for files that name the same
+/// long lists many times.
+const MAX_ITEMS: u64 = 1 << 30;
+
+/// Estimated memory of a JSON object of the description, whatever the length of its text \[bytes\].
+const OBJECT_BYTES: u64 = 512;
+
+/// Modes of primitives with triangles.
+const TRIANGLES: f64 = 4.0;
+const STRIP: f64 = 5.0;
+const FAN: f64 = 6.0;
+
+/// Base64 as in data URLs, whose padding some programs leave out.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &base64::alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
 
 /// Parses a glTF or GLB file.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
-    let Gltf { document, blob } = description(source)?;
-    let buffers = buffers(source, &document, blob.as_deref())?;
+    let gltf = Gltf::new(source)?;
     let mut builder = Builder::new(source);
-    let mut visited = vec![false; document.nodes().count()];
-    let mut stack: Vec<(Node, DAffine3)> =
-        roots(&document).into_iter().map(|node| (node, DAffine3::IDENTITY)).collect();
-    stack.reverse();
-    while let Some((node, outer)) = stack.pop() {
-        let place = || FileLocation::Part(format!("nodes[{}]", node.index()));
-        if std::mem::replace(&mut visited[node.index()], true) {
-            let found = "the node has two parents";
-            return Err(source.error(place(), found, "a tree of nodes"));
+    gltf.check_extensions(&mut builder)?;
+    let (order, scene_from_node) = gltf.transforms()?;
+    for index in order {
+        let node = &gltf.document.nodes[index];
+        let Some(m) = node.mesh else { continue };
+        let mesh = gltf.part(&gltf.document.meshes, m, format_args!("meshes[{m}]"))?;
+        let weights = node.weights.as_ref().or(mesh.weights.as_ref());
+        let weights = weights.map_or(&[][..], Vec::as_slice);
+        let joints = gltf.joints(node, &scene_from_node)?;
+        // The joints alone place a mesh with a skin.
+        let maps = match &joints {
+            Some(_) => vec![DAffine3::IDENTITY],
+            None => gltf.instances(node)?.into_iter().map(|m| scene_from_node[index] * m).collect(),
+        };
+        for map in maps {
+            gltf.count(mesh.primitives.len())?;
+            for (i, primitive) in mesh.primitives.iter().enumerate() {
+                let place = format_args!("meshes[{m}].primitives[{i}]");
+                let joints = joints.as_deref();
+                Part { gltf: &gltf, primitive, place, weights, joints }.add(&mut builder, map)?;
+            }
         }
-        let matrix = node.transform().matrix().map(|column| column.map(f64::from));
-        let map = outer * DAffine3::from_mat4(DMat4::from_cols_array_2d(&matrix));
-        if !map.is_finite() {
-            return Err(source.error(place(), "the transform is not finite", "finite numbers"));
-        }
-        for primitive in node.mesh().iter().flat_map(|mesh| mesh.primitives()) {
-            Part { source, buffers: &buffers, primitive, map }.add(&mut builder)?;
-        }
-        let children: Vec<_> = node.children().map(|child| (child, map)).collect();
-        stack.extend(children.into_iter().rev());
     }
     builder.finish()
 }
 
-/// Parses and validates the JSON document of the file.
-fn description(source: &FileContents) -> Result<Gltf, AssetError> {
-    // Bytes 8 to 11 of a GLB file are its length. The library subtracts the size of the header from
-    // this length without a check for underflow.
-    let length = source.bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    if source.bytes.starts_with(b"glTF") && length.is_none_or(|length| length < 12) {
-        return Err(source.error(
-            FileLocation::Byte(8),
-            "the length is below 12",
-            "the file's length",
-        ));
+/// glTF file with its description and the bytes of its buffers.
+struct Gltf<'a> {
+    source: &'a FileContents,
+    document: Document,
+    /// Binary chunk of a GLB file.
+    blob: Option<&'a [u8]>,
+    /// Bytes of the buffers that were read so far.
+    buffers: Vec<OnceCell<Cow<'a, [u8]>>>,
+    /// Number of bytes that were read from other files and data URLs.
+    bytes_read: Cell<u64>,
+    /// Number of items of lists and accessors that were read.
+    items_read: Cell<u64>,
+}
+
+impl<'a> Gltf<'a> {
+    /// Parses the description.
+    fn new(source: &'a FileContents) -> Result<Self, AssetError> {
+        let is_binary = source.bytes.starts_with(b"glTF");
+        let (json, blob) = if is_binary { chunks(source)? } else { (&source.bytes[..], None) };
+        let json = json.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(json);
+        let objects = json.iter().filter(|byte| **byte == b'{').count();
+        if let Some(missing) = missing_memory(objects as u64 * OBJECT_BYTES) {
+            let found = format!("the description of {objects} parts {missing}");
+            return Err(source.fault(found, "a smaller file, or more free memory"));
+        }
+        let document: Document = serde_json::from_slice(json).map_err(|error| {
+            let place = match is_binary {
+                true => FileLocation::Part("the description".to_string()),
+                false => FileLocation::Line(error.line()),
+            };
+            source.error(place, error.to_string(), "a glTF 2.0 file")
+        })?;
+        let version = &document.asset.version;
+        if !version.starts_with("2.") {
+            let found = format!("the version is \"{}\"", truncated(version));
+            let place = FileLocation::Part("asset.version".to_string());
+            return Err(source.error(place, found, "a glTF 2.0 file"));
+        }
+        let buffers = document.buffers.iter().map(|_| OnceCell::new()).collect();
+        let (bytes_read, items_read) = (Cell::new(0), Cell::new(0));
+        Ok(Self { source, document, blob, buffers, bytes_read, items_read })
     }
-    let gltf = Gltf::from_slice_without_validation(&source.bytes);
-    let gltf = gltf.map_err(|error| library_error(source, &error))?;
-    let json = gltf.document.into_json();
-    // This loop checks the accessor indices of attributes, because the validation by the library
-    // uses these indices before it checks them.
-    for (m, mesh) in json.meshes.iter().enumerate() {
-        for index in mesh.primitives.iter().flat_map(|p| p.attributes.values()) {
-            if index.value() >= json.accessors.len() {
-                let found = format!("an attribute names accessor {}", index.value());
-                let expected = format!("an accessor below {}, their number", json.accessors.len());
-                let place = FileLocation::Part(format!("meshes[{m}]"));
-                return Err(source.error(place, found, &expected));
+
+    fn error(&self, place: impl Display, found: impl Into<String>, expected: &str) -> AssetError {
+        self.source.error(FileLocation::Part(place.to_string()), found, expected)
+    }
+
+    /// Counts items that are read; fails if they exceed [`MAX_ITEMS`].
+    fn count(&self, items: usize) -> Result<(), AssetError> {
+        self.items_read.set(self.items_read.get().saturating_add(items as u64));
+        let message = "the scene has more than 2^30 numbers and parts";
+        let is_allowed = self.items_read.get() <= MAX_ITEMS;
+        is_allowed.then_some(()).ok_or_else(|| self.source.fault(message, "a smaller scene"))
+    }
+
+    /// Returns the element of `list` that `index` names; `place` is the name of that element.
+    fn part<'b, T>(
+        &self,
+        list: &'b [T],
+        index: f64,
+        place: impl Display,
+    ) -> Result<&'b T, AssetError> {
+        list.get(whole(index)).ok_or_else(|| {
+            let expected = format!("one of the {} elements of that list", list.len());
+            self.error(place, "the file names this part, which it lacks", &expected)
+        })
+    }
+
+    /// Refuses files that require an extension that may change what is read.
+    fn check_extensions(&self, builder: &mut Builder) -> Result<(), AssetError> {
+        for name in &self.document.extensions_required {
+            let shown = truncated(name);
+            if HARMLESS.iter().any(|part| name.contains(part)) {
+                builder.note(format!("the extension {shown} was not applied"));
+            } else if !KNOWN.contains(&name.as_str()) {
+                let found = format!("the file requires the extension \"{shown}\"");
+                return Err(self.error("extensionsRequired", found, "a file without it"));
             }
         }
+        Ok(())
     }
-    let document = Document::from_json(json).map_err(|error| library_error(source, &error))?;
-    Ok(Gltf { document, blob: gltf.blob })
-}
 
-/// Returns the root nodes of the default scene. Without a default scene, returns those of the first
-/// scene; without scenes, all nodes without a parent.
-fn roots(document: &Document) -> Vec<Node<'_>> {
-    if let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) {
-        return scene.nodes().collect();
-    }
-    let mut child = vec![false; document.nodes().count()];
-    document.nodes().flat_map(|n| n.children()).for_each(|c| child[c.index()] = true);
-    document.nodes().filter(|n| !child[n.index()]).collect()
-}
-
-/// Converts an error of the `gltf` library to an error with file and location.
-fn library_error(source: &FileContents, error: &gltf::Error) -> AssetError {
-    let (place, found) = match error {
-        gltf::Error::Deserialize(json) => {
-            let text = json.to_string();
-            let place = if source.bytes.starts_with(b"glTF") {
-                FileLocation::Part("the description".to_string())
-            } else {
-                FileLocation::Line(json.line())
-            };
-            (place, text)
-        }
-        gltf::Error::Validation(faults) => match faults.first() {
-            Some((path, fault)) => (FileLocation::Part(path.to_string()), fault.to_string()),
-            None => (FileLocation::Whole, "the description is not valid".to_string()),
-        },
-        other => (FileLocation::Whole, other.to_string()),
-    };
-    source.error(place, found, "a glTF 2.0 file")
-}
-
-/// Returns the bytes of all glTF buffers: from the binary chunk `blob` of a GLB file, from data
-/// URLs, or from files in the folder of `source`.
-fn buffers<'a>(
-    source: &FileContents,
-    document: &Document,
-    blob: Option<&'a [u8]>,
-) -> Result<Vec<Cow<'a, [u8]>>, AssetError> {
-    let mut all = Vec::new();
-    let mut total = 0;
-    for buffer in document.buffers() {
-        let place = || FileLocation::Part(format!("buffers[{}]", buffer.index()));
-        let wrong = |found: String, expected: &str| Err(source.error(place(), found, expected));
-        let bytes: Cow<[u8]> = match buffer.source() {
-            gltf::buffer::Source::Bin => match blob {
-                Some(blob) => Cow::Borrowed(blob),
-                None => return wrong("the buffer has no data".to_string(), "a uri or a BIN chunk"),
-            },
-            gltf::buffer::Source::Uri(uri) => match uri.strip_prefix("data:") {
-                Some(data) => {
-                    let text = data.split_once(";base64,").map(|(_, text)| text);
-                    let engine = base64::engine::general_purpose::STANDARD;
-                    match text.map(|text| engine.decode(text)) {
-                        Some(Ok(bytes)) => Cow::Owned(bytes),
-                        _ => return wrong("the data is not base64".to_string(), "base64"),
-                    }
-                }
-                None => {
-                    // Of the percent-encoded characters only spaces are decoded, because other ones
-                    // are rare in file names.
-                    let Some(path) = source.resolve_relative(&uri.replace("%20", " ")) else {
-                        return wrong(
-                            format!("uri is \"{}\"", truncated(uri)),
-                            "a relative path without \"..\", to a file in the same folder or below",
-                        );
-                    };
-                    Cow::Owned(FileContents::read(&path, MAX_BYTES - total)?.bytes)
-                }
-            },
+    /// Returns the nodes of the scene, parents first, and the transform of each node of the file.
+    /// The scene is the default one, or else the first one; without scenes it has all nodes.
+    fn transforms(&self) -> Result<(Vec<usize>, Vec<DAffine3>), AssetError> {
+        let nodes = &self.document.nodes;
+        let roots = match self.document.scene.or(self.document.scenes.first().map(|_| 0.0)) {
+            Some(scene) => self
+                .part(&self.document.scenes, scene, format_args!("scenes[{scene}]"))?
+                .nodes
+                .clone(),
+            None => {
+                let children = nodes.iter().flat_map(|n| &n.children).map(|i| whole(*i));
+                let children: HashSet<usize> = children.collect();
+                (0..nodes.len()).filter(|i| !children.contains(i)).map(|i| i as f64).collect()
+            }
         };
-        if bytes.len() < buffer.length() {
-            let found = format!("the buffer has {} bytes", bytes.len());
-            return wrong(found, &format!("at least {}, its byteLength", buffer.length()));
+        let mut order = Vec::new();
+        let mut scene_from_node = vec![DAffine3::IDENTITY; nodes.len()];
+        let mut is_known = vec![false; nodes.len()];
+        let mut stack: Vec<_> = roots.iter().rev().map(|i| (*i, DAffine3::IDENTITY)).collect();
+        while let Some((index, outer)) = stack.pop() {
+            let place = format_args!("nodes[{index}]");
+            let node = self.part(nodes, index, place)?;
+            let i = whole(index);
+            if std::mem::replace(&mut is_known[i], true) {
+                return Err(self.error(place, "the node has two parents", "a tree of nodes"));
+            }
+            let map = outer * node.map();
+            if !map.is_finite() {
+                return Err(self.error(place, "the transform is not finite", "finite numbers"));
+            }
+            scene_from_node[i] = map;
+            order.push(i);
+            stack.extend(node.children.iter().rev().map(|child| (*child, map)));
         }
-        if let Cow::Owned(bytes) = &bytes {
-            total += bytes.len() as u64;
-        }
-        all.push(bytes);
+        Ok((order, scene_from_node))
     }
-    Ok(all)
+
+    /// Returns the maps of the joints of a node's skin; `None` without a skin.
+    fn joints(
+        &self,
+        node: &Node,
+        scene_from_node: &[DAffine3],
+    ) -> Result<Option<Vec<DAffine3>>, AssetError> {
+        let Some(skin) = node.skin else { return Ok(None) };
+        let place = format_args!("skins[{skin}]");
+        let skin = self.part(&self.document.skins, skin, place)?;
+        self.count(skin.joints.len())?;
+        let matrices = match skin.inverse_bind_matrices {
+            Some(accessor) => self.numbers::<16>(accessor)?,
+            None => Vec::new(),
+        };
+        let joint = |(i, joint): (usize, &f64)| {
+            let map = *self.part(scene_from_node, *joint, place)?;
+            let matrix = matrices.get(i).map(DMat4::from_cols_array);
+            Ok(map * matrix.map_or(DAffine3::IDENTITY, DAffine3::from_mat4))
+        };
+        skin.joints.iter().enumerate().map(joint).collect::<Result<_, _>>().map(Some)
+    }
+
+    /// Returns the maps of a node's instances (`EXT_mesh_gpu_instancing`), one without them.
+    fn instances(&self, node: &Node) -> Result<Vec<DAffine3>, AssetError> {
+        let Some(Instances { attributes }) = &node.extensions.instances else {
+            return Ok(vec![DAffine3::IDENTITY]);
+        };
+        let translations = self.attribute::<3>(attributes, "TRANSLATION")?.unwrap_or_default();
+        let rotations = self.attribute::<4>(attributes, "ROTATION")?.unwrap_or_default();
+        let scales = self.attribute::<3>(attributes, "SCALE")?.unwrap_or_default();
+        let count = translations.len().max(rotations.len()).max(scales.len());
+        let map = |i| {
+            let rotation = rotations.get(i).copied().unwrap_or(DQuat::IDENTITY.to_array());
+            DAffine3::from_scale_rotation_translation(
+                scales.get(i).copied().unwrap_or([1.0; 3]).into(),
+                DQuat::from_array(rotation).normalize(),
+                translations.get(i).copied().unwrap_or([0.0; 3]).into(),
+            )
+        };
+        Ok((0..count).map(map).collect())
+    }
+
+    /// Returns the attribute `name`; `None` if the file lacks it.
+    fn attribute<const N: usize>(
+        &self,
+        attributes: &Attributes,
+        name: &str,
+    ) -> Result<Option<Vec<[f64; N]>>, AssetError> {
+        attributes.get(name).map(|accessor| self.numbers(*accessor)).transpose()
+    }
+
+    /// Returns the elements of an accessor of vectors of `N` numbers.
+    fn numbers<const N: usize>(&self, index: f64) -> Result<Vec<[f64; N]>, AssetError> {
+        let place = format_args!("accessors[{index}]");
+        let accessor = self.part(&self.document.accessors, index, place)?;
+        let kind = [(1, "SCALAR"), (2, "VEC2"), (3, "VEC3"), (4, "VEC4"), (16, "MAT4")];
+        let kind = kind.into_iter().find(|(n, _)| *n == N).map_or("", |(_, kind)| kind);
+        if accessor.kind != kind {
+            let found = format!("the type is \"{}\"", truncated(&accessor.kind));
+            return Err(self.error(place, found, kind));
+        }
+        let (count, component_type) = (whole(accessor.count), accessor.component_type);
+        self.count(count)?;
+        let mut all: Vec<[f64; N]> = match accessor.buffer_view {
+            Some(buffer_view) => {
+                let byte_offset = accessor.byte_offset;
+                let items =
+                    self.items(&View { buffer_view, byte_offset, component_type }, N, count)?;
+                (0..count).map(|i| items.get(i)).collect()
+            }
+            // All elements are 0. There are as many as in other accessors, which have data.
+            None if count.saturating_mul(N) as u64 <= self.total_bytes() => vec![[0.0; N]; count],
+            None => {
+                let found = format!("there are {count} items without data");
+                return Err(self.error(place, found, "a bufferView"));
+            }
+        };
+        if let Some(Sparse { count, indices, values }) = &accessor.sparse {
+            let count = whole(*count);
+            let indices = self.items(indices, 1, count)?;
+            let values = self.items(&View { component_type, ..*values }, N, count)?;
+            for i in 0..count {
+                let [index] = indices.get(i);
+                let found = || format!("a sparse index is {index}");
+                let beyond = || self.error(place, found(), "an index of the accessor");
+                *all.get_mut(whole(index)).ok_or_else(beyond)? = values.get(i);
+            }
+        }
+        if accessor.normalized
+            && let Some((_, largest)) = component_of(component_type)
+        {
+            all.as_flattened_mut().iter_mut().for_each(|x| *x = (*x / largest).max(-1.0));
+        }
+        Ok(all)
+    }
+
+    /// Returns `count` items of `n` components in a buffer view. Checks that they lie in the view
+    /// and in its buffer.
+    fn items(&self, at: &View, n: usize, count: usize) -> Result<Items<'_>, AssetError> {
+        let place = format_args!("bufferViews[{}]", at.buffer_view);
+        let view = self.part(&self.document.buffer_views, at.buffer_view, place)?;
+        if view.extensions.meshopt.is_some() {
+            let found = "the data is compressed (EXT_meshopt_compression)";
+            return Err(self.error(place, found, "a file without compression"));
+        }
+        let component = at.component_type;
+        let Some((width, _)) = component_of(component) else {
+            let found = format!("a componentType is {component}");
+            return Err(self.error(place, found, "5120 to 5123, 5125 or 5126"));
+        };
+        let size = n * width;
+        let stride = view.byte_stride.map_or(size, whole);
+        let buffer = self.buffer(view.buffer)?;
+        let bytes = || {
+            let [begin, length, offset] =
+                [view.byte_offset, view.byte_length, at.byte_offset].map(whole);
+            let view = buffer.get(begin..begin.checked_add(length)?)?;
+            let items = count.checked_sub(1)?.checked_mul(stride)?.checked_add(size)?;
+            view.get(offset..offset.checked_add(items)?).filter(|_| stride >= size)
+        };
+        bytes().map(|bytes| Items { bytes, stride, width, component }).ok_or_else(|| {
+            let found = format!("{count} items of {size} bytes do not lie in their buffer");
+            let expected = "a range inside its bufferView and buffer, with at least one item";
+            self.error(place, found, expected)
+        })
+    }
+
+    /// Returns the bytes of a buffer: the binary chunk, a data URL, or a file in the folder of the
+    /// glTF file.
+    fn buffer(&self, index: f64) -> Result<&[u8], AssetError> {
+        let place = format_args!("buffers[{index}]");
+        let buffer = self.part(&self.document.buffers, index, place)?;
+        let cell = &self.buffers[whole(index)];
+        if let Some(bytes) = cell.get() {
+            return Ok(bytes);
+        }
+        let wrong = |found: &str, expected: &str| self.error(place, found, expected);
+        let bytes: Cow<[u8]> =
+            match buffer.uri.as_deref().map(|uri| (uri, uri.strip_prefix("data:"))) {
+                None => Cow::Borrowed(
+                    self.blob
+                        .ok_or_else(|| wrong("the buffer has no data", "a uri or a BIN chunk"))?,
+                ),
+                Some((_, Some(data))) => {
+                    let text = data.split_once(";base64,").map(|(_, text)| unescaped(text));
+                    let bytes = text.and_then(|text| BASE64.decode(text).ok());
+                    Cow::Owned(bytes.ok_or_else(|| wrong("the data is not base64", "base64"))?)
+                }
+                Some((uri, None)) => {
+                    let name = String::from_utf8_lossy(&unescaped(uri)).into_owned();
+                    let path = self.source.resolve_relative(&name).ok_or_else(|| {
+                        let found = format!("uri is \"{}\"", truncated(uri));
+                        wrong(
+                            &found,
+                            "a relative path without \"..\", to a file in the same folder or below",
+                        )
+                    })?;
+                    let limit = MAX_BYTES - self.bytes_read.get();
+                    Cow::Owned(FileContents::read(&path, limit)?.bytes)
+                }
+            };
+        if matches!(bytes, Cow::Owned(_)) {
+            self.bytes_read.set(self.bytes_read.get() + bytes.len() as u64);
+        }
+        Ok(cell.get_or_init(|| bytes))
+    }
+
+    fn total_bytes(&self) -> u64 {
+        self.source.bytes.len() as u64 + self.bytes_read.get()
+    }
+}
+
+/// Returns the size in bytes of a component type, and the number that is 1 if it is normalised.
+fn component_of(component: f64) -> Option<(usize, f64)> {
+    Some(match component as u32 {
+        5120 => (1, 127.0),
+        5121 => (1, 255.0),
+        5122 => (2, 32767.0),
+        5123 => (2, 65535.0),
+        5125 => (4, 4_294_967_295.0),
+        5126 => (4, 1.0),
+        _ => return None,
+    })
+}
+
+/// Items of a buffer view, which begin every `stride` bytes. Each component has `width` bytes.
+struct Items<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    width: usize,
+    component: f64,
+}
+
+impl Items<'_> {
+    fn get<const N: usize>(&self, i: usize) -> [f64; N] {
+        std::array::from_fn(|k| {
+            let bytes = &self.bytes[i * self.stride + k * self.width..][..self.width];
+            let mut word = [0; 4];
+            word[..self.width].copy_from_slice(bytes);
+            let bits = u32::from_le_bytes(word);
+            match self.component as u32 {
+                5120 => (bits as i8).into(),
+                5122 => (bits as i16).into(),
+                5126 => f32::from_bits(bits).into(),
+                _ => bits.into(),
+            }
+        })
+    }
+}
+
+/// Returns the JSON chunk of a GLB file and its binary chunk, which it may lack.
+fn chunks(source: &FileContents) -> Result<(&[u8], Option<&[u8]>), AssetError> {
+    let word = |at: usize| source.bytes.get(at..)?.first_chunk().map(|b| u32::from_le_bytes(*b));
+    // A chunk begins with its length and its name.
+    let chunk = |at: usize, name: &[u8]| {
+        let rest = source.bytes.get(at + 4..)?.strip_prefix(name)?;
+        rest.get(..word(at)? as usize)
+    };
+    let json = chunk(12, b"JSON").filter(|_| word(4) == Some(2)).ok_or_else(|| {
+        let found = "the version is not 2, or the chunk JSON is not complete";
+        source.error(FileLocation::Byte(4), found, "a GLB file of version 2")
+    })?;
+    Ok((json, chunk(20 + json.len(), b"BIN\0")))
+}
+
+/// Returns `text` with its percent-encoded bytes decoded (RFC 3986).
+fn unescaped(text: &str) -> Vec<u8> {
+    let mut out = Vec::with_capacity(text.len());
+    let mut rest = text.as_bytes();
+    while let Some((first, after)) = rest.split_first() {
+        let digit = |i: usize| char::from(*after.get(i)?).to_digit(16);
+        let code = digit(0).zip(digit(1)).filter(|_| *first == b'%');
+        out.push(code.map_or(*first, |(high, low)| (16 * high + low) as u8));
+        rest = if code.is_some() { &after[2..] } else { after };
+    }
+    out
 }
 
 /// Returns the triangles of a list, strip or fan with `corners` corners, each as the indices of its
 /// three corners. The sense of rotation is reversed if the part is `mirrored`.
-fn faces(mode: Mode, corners: usize, mirrored: bool) -> impl ExactSizeIterator<Item = [usize; 3]> {
-    let count = if mode == Mode::Triangles { corners / 3 } else { corners.saturating_sub(2) };
+fn faces(mode: f64, corners: usize, mirrored: bool) -> impl ExactSizeIterator<Item = [usize; 3]> {
+    let count = if mode == TRIANGLES { corners / 3 } else { corners.saturating_sub(2) };
     (0..count).map(move |i| {
         let [a, b, c] = match mode {
-            Mode::TriangleStrip => strip(i),
-            Mode::TriangleFan => [0, i + 1, i + 2],
+            STRIP => strip(i),
+            FAN => [0, i + 1, i + 2],
             _ => [3 * i, 3 * i + 1, 3 * i + 2],
         };
         if mirrored { [a, c, b] } else { [a, b, c] }
     })
 }
 
-/// Part of a glTF scene: a primitive (a piece of a mesh) with the transform of its node.
-struct Part<'a> {
-    source: &'a FileContents,
-    buffers: &'a [Cow<'a, [u8]>],
-    primitive: Primitive<'a>,
-    map: DAffine3,
+/// Part of a glTF scene: a primitive (a piece of a mesh) with the morph weights of its node and the
+/// maps of the joints of its skin.
+struct Part<'a, 'b> {
+    gltf: &'a Gltf<'b>,
+    primitive: &'a Primitive,
+    place: Arguments<'a>,
+    weights: &'a [f64],
+    joints: Option<&'a [DAffine3]>,
 }
 
-impl<'a> Part<'a> {
-    /// Adds vertices, colour and triangles of this part to `builder`. Leaves out points and lines.
-    fn add(&self, builder: &mut Builder) -> Result<(), AssetError> {
-        let mode = self.primitive.mode();
-        if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+impl Part<'_, '_> {
+    /// Adds vertices, colour and triangles of this part, placed by `map`. Leaves out points and
+    /// lines.
+    fn add(&self, builder: &mut Builder, map: DAffine3) -> Result<(), AssetError> {
+        let Primitive { attributes, extensions, mode, indices, .. } = self.primitive;
+        if extensions.draco.is_some() {
+            let found = "the data is compressed (KHR_draco_mesh_compression)";
+            return Err(self.gltf.error(self.place, found, "a file without compression"));
+        }
+        let mode = mode.unwrap_or(TRIANGLES);
+        if ![TRIANGLES, STRIP, FAN].contains(&mode) {
             builder.note("points and lines were left out");
             return Ok(());
         }
-        let Some(positions) = self.primitive.get(&Semantic::Positions) else {
+        let Some(mut positions) = self.gltf.attribute::<3>(attributes, "POSITION")? else {
             builder.note("a part without positions was left out");
             return Ok(());
         };
-        let vertices = positions.count();
-        let positions = self.slice(&positions, Dimensions::Vec3)?;
-        let normals = self.primitive.get(&Semantic::Normals);
-        let normals = normals.map(|a| self.slice(&a, Dimensions::Vec3));
-        let normals = normals.transpose()?;
-        let uvs = self.primitive.get(&Semantic::TexCoords(0));
-        let uvs = uvs.map(|a| self.slice(&a, Dimensions::Vec2)).transpose()?;
+        let mut normals = self.gltf.attribute::<3>(attributes, "NORMAL")?.unwrap_or_default();
+        self.morph("POSITION", &mut positions)?;
+        self.morph("NORMAL", &mut normals)?;
+        let uvs = self.gltf.attribute::<2>(attributes, "TEXCOORD_0")?.unwrap_or_default();
+        let skin = self.skin(positions.len())?;
         self.add_color(builder)?;
-        let indices = self.primitive.indices();
-        let indices = indices.map(|a| self.slice(&a, Dimensions::Scalar));
-        let indices = indices.transpose()?;
-        let corners = indices.as_ref().map_or(vertices, |s| s.count);
-        let linear = self.map.matrix3;
-        let faces = faces(mode, corners, linear.determinant() < 0.0);
-        builder.reserve(vertices, faces.len())?;
+        let indices = indices.map(|a| self.gltf.numbers::<1>(a)).transpose()?;
+        let corners = indices.as_ref().map_or(positions.len(), Vec::len);
+        let with_normals = |map: DAffine3| (map, map.matrix3.inverse().transpose());
+        let fixed = with_normals(skin.first().copied().unwrap_or(map));
+        let faces = faces(mode, corners, fixed.0.matrix3.determinant() < 0.0);
+        builder.reserve(positions.len(), faces.len())?;
         let base = builder.vertices();
-        let normal_map = linear.inverse().transpose();
-        for i in 0..vertices {
-            let position = self.map.transform_point3(DVec3::from_array(positions.numbers(i)));
-            let normal = normals.filter(|normals| i < normals.count).map(|normals| {
-                let normal = normal_map * DVec3::from_array(normals.numbers(i));
+        for (i, position) in positions.into_iter().enumerate() {
+            let (map, normal_map) = skin.get(i).map_or(fixed, |map| with_normals(*map));
+            let normal = normals.get(i).map(|normal| {
+                let normal = normal_map * DVec3::from(*normal);
                 normal.normalize_or_zero().as_vec3().to_array()
             });
-            let uv = uvs.filter(|uvs| i < uvs.count).map(|uvs| {
-                let [u, v] = uvs.numbers(i).map(|x| (x / uvs.largest()) as f32);
-                // The texture coordinate v points downwards in glTF, and upwards in
-                // [`TriangleMesh::uvs`].
-                [u, 1.0 - v]
-            });
-            builder.vertex(position.to_array(), normal, uv);
+            // The texture coordinate v points downwards in glTF, and upwards in
+            // [`TriangleMesh::uvs`].
+            let uv = uvs.get(i).map(|[u, v]| [*u as f32, 1.0 - *v as f32]);
+            builder.vertex(map.transform_point3(position.into()).to_array(), normal, uv);
         }
-        let place =
-            || FileLocation::Part(format!("meshes[..].primitives[{}]", self.primitive.index()));
-        let corner = |i: usize| match &indices {
-            Some(slice) => slice.numbers::<1>(i)[0],
-            None => i as f64,
-        };
-        for [a, b, c] in faces {
-            let index = |i| builder.index(corner(i), base, place);
-            builder.triangle([index(a)?, index(b)?, index(c)?])?;
+        let place = || FileLocation::Part(self.place.to_string());
+        for face in faces {
+            let index = |corner: usize| {
+                let number = indices.as_ref().map_or(corner as f64, |list| list[corner][0]);
+                builder.index(number, base, place)
+            };
+            let [a, b, c] = face.map(index);
+            builder.triangle([a?, b?, c?])?;
         }
         Ok(())
     }
 
-    /// Makes the base colour of this part the colour of the triangles that are added next.
+    /// Adds the morph targets to the attribute `name`, each with its weight.
+    fn morph(&self, name: &str, values: &mut [[f64; 3]]) -> Result<(), AssetError> {
+        let targets = self.primitive.targets.iter().zip(self.weights);
+        for (target, weight) in targets.filter(|(_, weight)| **weight != 0.0) {
+            let shifts = self.gltf.attribute::<3>(target, name)?.unwrap_or_default();
+            for (value, shift) in values.as_flattened_mut().iter_mut().zip(shifts.as_flattened()) {
+                *value += weight * shift;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the map of each vertex: the mean of the maps of its joints, by their weights. Empty
+    /// without a skin.
+    fn skin(&self, vertices: usize) -> Result<Vec<DAffine3>, AssetError> {
+        let Some(joints) = self.joints else { return Ok(Vec::new()) };
+        let mut sums = vec![DAffine3::ZERO; vertices];
+        let attributes = &self.primitive.attributes;
+        for set in 0.. {
+            let indices = self.gltf.attribute::<4>(attributes, &format!("JOINTS_{set}"))?;
+            let weights = self.gltf.attribute::<4>(attributes, &format!("WEIGHTS_{set}"))?;
+            let (Some(indices), Some(weights)) = (indices, weights) else { break };
+            for ((sum, indices), weights) in sums.iter_mut().zip(indices).zip(weights) {
+                for (joint, weight) in indices.into_iter().zip(weights).filter(|(_, w)| *w != 0.0) {
+                    let map = self.gltf.part(joints, joint, self.place)?;
+                    sum.matrix3 += map.matrix3 * weight;
+                    sum.translation += map.translation * weight;
+                }
+            }
+        }
+        Ok(sums)
+    }
+
+    /// Makes the base colour of this part the colour of the triangles that are added next. Notes
+    /// other colours.
     fn add_color(&self, builder: &mut Builder) -> Result<(), AssetError> {
-        let [r, g, b, _] = self.primitive.material().pbr_metallic_roughness().base_color_factor();
+        if self.primitive.attributes.contains_key("COLOR_0") {
+            builder.note("the colours of the vertices of a part were not read");
+        }
+        let document = &self.gltf.document;
+        let material = match self.primitive.material {
+            Some(index) => {
+                self.gltf.part(&document.materials, index, format_args!("materials[{index}]"))?
+            }
+            None => &Material::default(),
+        };
+        let surface = &material.pbr_metallic_roughness;
+        if surface.base_color_texture.is_some() {
+            builder.note("the base colour texture of a part was not read");
+        }
+        let [r, g, b, _] = surface.base_color_factor.unwrap_or([1.0; 4]);
         if ![r, g, b].iter().all(|x| (0.0..=1e6).contains(x)) {
             let found = "a base colour is not a colour";
-            return Err(self.source.fault(found, "numbers of at least 0"));
+            return Err(self.gltf.error(self.place, found, "numbers of at least 0"));
         }
         // Triangles without a stored colour are white.
         if [r, g, b] != [1.0; 3] || builder.has_colors() {
@@ -253,84 +581,394 @@ impl<'a> Part<'a> {
         }
         Ok(())
     }
+}
 
-    /// Returns the elements of `accessor`, a glTF list. Checks that the elements have `dimensions`
-    /// (such as a vector of three) and components of a type that is read, and that all elements are
-    /// inside their buffer.
-    fn slice(
-        &self,
-        accessor: &Accessor<'a>,
-        dimensions: Dimensions,
-    ) -> Result<Slice<'a>, AssetError> {
-        let place = || FileLocation::Part(format!("accessors[{}]", accessor.index()));
-        let wrong =
-            |found: String, expected: &str| Err(self.source.error(place(), found, expected));
-        let (found, kind) = (accessor.dimensions(), accessor.data_type());
-        let (kinds, expected): (&[DataType], _) = match dimensions {
-            Dimensions::Scalar => {
-                (&[DataType::U8, DataType::U16, DataType::U32], "unsigned integers")
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+    use std::path::{Path, PathBuf};
+
+    /// Bytes of a buffer, with accessors of its parts.
+    #[derive(Default)]
+    struct Parts {
+        bytes: Vec<u8>,
+        views: Vec<Value>,
+        accessors: Vec<Value>,
+    }
+
+    impl Parts {
+        /// Adds a view of `numbers` in the type `component`. Items begin on multiples of four bytes.
+        fn view(&mut self, component: u32, items: &[&[f64]]) -> usize {
+            let begin = self.bytes.len();
+            for item in items {
+                for x in *item {
+                    match component {
+                        5120 => self.bytes.extend((*x as i8).to_le_bytes()),
+                        5121 => self.bytes.extend((*x as u8).to_le_bytes()),
+                        5122 => self.bytes.extend((*x as i16).to_le_bytes()),
+                        5123 => self.bytes.extend((*x as u16).to_le_bytes()),
+                        5125 => self.bytes.extend((*x as u32).to_le_bytes()),
+                        _ => self.bytes.extend((*x as f32).to_le_bytes()),
+                    }
+                }
+                self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
             }
-            Dimensions::Vec2 => (&[DataType::U8, DataType::U16, DataType::F32], "pairs of numbers"),
-            _ => (&[DataType::F32], "triples of 32-bit floats"),
-        };
-        if found != dimensions || !kinds.contains(&kind) {
-            return wrong(format!("the data is {found:?} of {kind:?}"), expected);
+            let length = self.bytes.len() - begin;
+            self.views.push(json!({"buffer": 0, "byteOffset": begin, "byteLength": length,
+                                   "byteStride": length / items.len()}));
+            self.views.len() - 1
         }
-        if accessor.sparse().is_some() {
-            return wrong("the accessor is sparse".to_string(), "one that is not");
+
+        fn accessor(&mut self, component: u32, items: &[&[f64]]) -> usize {
+            let kind =
+                ["SCALAR", "VEC2", "VEC3", "VEC4"].get(items[0].len() - 1).unwrap_or(&"MAT4");
+            let view = self.view(component, items);
+            self.accessors.push(json!({"bufferView": view, "componentType": component,
+                                       "count": items.len(), "type": kind}));
+            self.accessors.len() - 1
         }
-        let Some(view) = accessor.view() else {
-            return wrong("the accessor names no bufferView".to_string(), "one that does");
-        };
-        let size = kind.size() * dimensions.multiplicity();
-        let stride = view.stride().unwrap_or(size);
-        let count = accessor.count();
-        let bytes = self.buffers.get(view.buffer().index()).and_then(|buffer| {
-            let end = view.offset().checked_add(view.length())?;
-            let view = buffer.get(view.offset()..end)?;
-            let items = count.checked_sub(1)?.checked_mul(stride)?.checked_add(size)?;
-            view.get(accessor.offset()..accessor.offset().checked_add(items)?)
-        });
-        match bytes {
-            Some(bytes) if stride >= size => Ok(Slice { bytes, stride, kind, count }),
-            _ => wrong(
-                format!("{count} items of {size} bytes do not lie in their buffer"),
-                "a range inside its bufferView and buffer, with at least one item",
+
+        /// Returns a file with a node, its mesh and one primitive.
+        fn file(&self, attributes: Value) -> Value {
+            let data = BASE64.encode(&self.bytes);
+            json!({
+                "asset": {"version": "2.0"},
+                "buffers": [{"byteLength": self.bytes.len(), "uri": format!("data:x/y;base64,{data}")}],
+                "bufferViews": self.views,
+                "accessors": self.accessors,
+                "meshes": [{"primitives": [{"attributes": attributes, "mode": 6}]}],
+                "nodes": [{"mesh": 0}],
+                "scenes": [{"nodes": [0]}],
+            })
+        }
+    }
+
+    const SQUARE: [&[f64]; 4] = [&[0., 0., 0.], &[1., 0., 0.], &[1., 1., 0.], &[0., 1., 0.]];
+
+    fn square() -> (Parts, Value) {
+        let mut parts = Parts::default();
+        parts.accessor(5126, &SQUARE);
+        let file = parts.file(json!({"POSITION": 0}));
+        (parts, file)
+    }
+
+    fn read_in(folder: &Path, file: &Value) -> Result<TriangleMesh, AssetError> {
+        parse(&FileContents { path: folder.join("a.gltf"), bytes: file.to_string().into() })
+    }
+
+    fn read(file: &Value) -> TriangleMesh {
+        read_in(Path::new("/nowhere"), file).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn refused(file: &Value) -> String {
+        read_in(Path::new("/nowhere"), file).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn gltf_component_types_are_read() {
+        for (component, largest) in [
+            (5120, 127.0),
+            (5121, 255.0),
+            (5122, 32767.0),
+            (5123, 65535.0),
+            (5125, 1.0),
+            (5126, 1.0),
+        ] {
+            for normalized in
+                [false, component < 5124].into_iter().take(1 + usize::from(component < 5124))
+            {
+                let one = if normalized { largest } else { 1.0 };
+                let scaled: Vec<Vec<f64>> =
+                    SQUARE.iter().map(|item| item.iter().map(|x| x * one).collect()).collect();
+                let scaled: Vec<&[f64]> = scaled.iter().map(Vec::as_slice).collect();
+                let mut parts = Parts::default();
+                parts.accessor(component, &scaled);
+                parts
+                    .accessor(component, &scaled.iter().map(|item| &item[..2]).collect::<Vec<_>>());
+                parts.accessor(component, &[&[0.0, 0.0, one] as &[f64]; 4]);
+                parts.accessors.iter_mut().for_each(|a| a["normalized"] = json!(normalized));
+                let mut file = parts.file(json!({"POSITION": 0, "TEXCOORD_0": 1, "NORMAL": 2}));
+                file["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+                let mesh = read(&file);
+                let case = format!("{component} {normalized}");
+                assert_eq!(mesh.bounds, [[0.0; 3], [1.0, 1.0, 0.0]], "{case}");
+                assert_eq!(mesh.uvs.unwrap()[2], [1.0, 0.0], "{case}");
+                assert_eq!(mesh.normals.unwrap(), [[0.0, 0.0, 1.0]; 4], "{case}");
+            }
+        }
+        for component in [5121, 5123, 5125] {
+            let (mut parts, _) = square();
+            let indices: [&[f64]; 6] = [&[0.0], &[1.0], &[2.0], &[0.0], &[2.0], &[3.0]];
+            parts.accessor(component, &indices);
+            let mut file = parts.file(json!({"POSITION": 0}));
+            file["meshes"][0]["primitives"][0]["indices"] = json!(1.0);
+            file["meshes"][0]["primitives"][0]["mode"] = json!(4);
+            assert_eq!(read(&file).triangles, [[0, 1, 2], [0, 2, 3]], "{component}");
+        }
+        // The least integer of a signed type is -1, too.
+        let mut parts = Parts::default();
+        parts.accessor(5120, &[&[-128., -127., 0.], &[127., -127., 0.], &[0., 127., 0.]]);
+        parts.accessors[0]["normalized"] = json!(true);
+        assert_eq!(read(&parts.file(json!({"POSITION": 0}))).bounds[0], [-1.0, -1.0, 0.0]);
+    }
+
+    #[test]
+    fn gltf_sparse_accessors_are_read() {
+        for component in [5121, 5123, 5125] {
+            let mut parts = Parts::default();
+            parts.accessor(5126, &[SQUARE[0], &[9.0; 3], SQUARE[2], &[9.0; 3]]);
+            let indices = parts.view(component, &[&[1.0], &[3.0]]);
+            let values = parts.view(5126, &[SQUARE[1], SQUARE[3]]);
+            parts.views[indices].as_object_mut().unwrap().remove("byteStride");
+            let sparse = json!({"count": 2, "values": {"bufferView": values},
+                                "indices": {"bufferView": indices, "componentType": component}});
+            // Two indices of one type lie without gaps.
+            let width = [1, 2, 4][(component as usize - 5121) / 2];
+            let begin = parts.views[indices]["byteOffset"].as_u64().unwrap() as usize;
+            let packed: Vec<u8> =
+                [1u32, 3].iter().flat_map(|i| i.to_le_bytes()[..width].to_vec()).collect();
+            parts.bytes[begin..begin + packed.len()].copy_from_slice(&packed);
+            parts.accessors[0]["sparse"] = sparse;
+            let mut file = parts.file(json!({"POSITION": 0}));
+            assert_eq!(read(&file).bounds, [[0.0; 3], [1.0, 1.0, 0.0]], "{component}");
+            // Without a view, the other elements are 0.
+            file["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+            file["meshes"][0]["primitives"][0]["mode"] = json!(5);
+            let mesh = read(&file);
+            assert_eq!(mesh.positions, [[0.0; 3], [1.0, 0.0, 0.0], [0.0; 3], [0.0, 1.0, 0.0]]);
+            file["accessors"][0]["count"] = json!(3);
+            assert!(refused(&file).contains("a sparse index is 3"), "{}", refused(&file));
+            file["accessors"][0]["count"] = json!(1e9);
+            assert!(refused(&file).contains("1000000000 items without data"), "{}", refused(&file));
+        }
+    }
+
+    #[test]
+    fn gltf_parts_that_are_not_read_may_be_faulty() {
+        let (_, file) = square();
+        let expected = read(&file);
+        for (pointer, value) in [
+            ("/meshes/0/primitives/0/attributes/_FEATURE_ID_0", json!(77)),
+            ("/meshes/0/primitives/0/attributes/TANGENT", json!(99)),
+            ("/textures", json!([{"sampler": 5}])),
+            ("/images", json!([{"uri": "../../secret.png"}])),
+            ("/animations", json!([{"channels": [{"target": {}}], "samplers": []}])),
+            ("/cameras", json!([{"type": "none"}])),
+            ("/extensions", json!({"KHR_lights_punctual": {"lights": 3}})),
+            ("/nodes/0/camera", json!(9)),
+            ("/nodes/0/extras", json!({"a": [1]})),
+            ("/materials", json!([{"alphaMode": "?", "normalTexture": {"index": 9}}])),
+            ("/skins", json!([{"joints": [8]}])),
+            ("/scene", json!(0.0)),
+            ("/extensionsUsed", json!(["VENDOR_unknown"])),
+        ] {
+            let mut changed = file.clone();
+            let (parent, key) = pointer.rsplit_once('/').unwrap();
+            changed.pointer_mut(parent).unwrap()[key] = value;
+            assert_eq!(read(&changed), expected, "{pointer}");
+        }
+        let mut changed = file.clone();
+        for (list, part) in [
+            ("accessors", json!({"bufferView": 9, "type": "VEC7"})),
+            ("bufferViews", json!({"buffer": 7, "byteOffset": -1})),
+            ("buffers", json!({"uri": "/missing.bin"})),
+            ("meshes", json!({"primitives": [{"attributes": {"POSITION": 9}}]})),
+        ] {
+            changed[list].as_array_mut().unwrap().push(part);
+        }
+        assert_eq!(read(&changed), expected);
+        for name in [
+            "KHR_materials_unlit",
+            "KHR_texture_transform",
+            "KHR_materials_variants",
+            "KHR_texture_basisu",
+            "EXT_texture_webp",
+            "KHR_lights_punctual",
+            "KHR_xmp_json_ld",
+            "EXT_structural_metadata",
+        ] {
+            let mut changed = file.clone();
+            changed["extensionsRequired"] = json!([name]);
+            assert_eq!(read(&changed).notes, [format!("the extension {name} was not applied")]);
+        }
+    }
+
+    #[test]
+    fn gltf_buffer_names_are_percent_encoded() {
+        let folder = tempfile::tempdir().unwrap();
+        let (parts, mut file) = square();
+        for (uri, name) in [
+            ("m%C3%BC.bin", "m\u{fc}.bin"),
+            ("a%281%29.bin", "a(1).bin"),
+            ("a%23b%3F%26%2B.bin", "a#b?&+.bin"),
+            ("100%.bin", "100%.bin"),
+            ("a b%20c.bin", "a b c.bin"),
+            ("x%2Fa.bin", "x/a.bin"),
+        ] {
+            std::fs::create_dir_all(folder.path().join("x")).unwrap();
+            std::fs::write(folder.path().join(name), &parts.bytes).unwrap();
+            file["buffers"][0]["uri"] = json!(uri);
+            let mesh = read_in(folder.path(), &file).unwrap_or_else(|e| panic!("{uri}: {e}"));
+            assert_eq!(mesh.triangles.len(), 2);
+        }
+        for uri in
+            ["..%2Fa.bin", "%2E%2E/a.bin", "%2Fetc%2Fpasswd", "x%2F..%2F..%2Fa", "http%3A//a"]
+        {
+            file["buffers"][0]["uri"] = json!(uri);
+            let error = read_in(folder.path(), &file).unwrap_err();
+            assert!(error.expected.contains("in the same folder"), "{error}");
+        }
+        let data = BASE64.encode(&parts.bytes).replace('=', "").replace('A', "%41");
+        file["buffers"][0]["uri"] = json!(format!("data:;base64,{data}"));
+        assert_eq!(read(&file).triangles.len(), 2);
+    }
+
+    #[test]
+    fn gltf_errors_and_notes_name_the_part() {
+        let (_, file) = square();
+        for (pointer, value, words) in [
+            ("/asset/version", json!("1.0"), "asset.version: the version is"),
+            ("/extensionsRequired", json!(["VENDOR_x"]), "requires the extension \"VENDOR_x\""),
+            (
+                "/meshes/0/primitives/0/extensions",
+                json!({"KHR_draco_mesh_compression": {"bufferView": 0}}),
+                "meshes[0].primitives[0]: the data is compressed (KHR_draco_mesh_compression)",
             ),
+            (
+                "/bufferViews/0/extensions",
+                json!({"EXT_meshopt_compression": {}}),
+                "bufferViews[0]: the data is compressed (EXT_meshopt_compression)",
+            ),
+            (
+                "/bufferViews/0/extensions",
+                json!({"KHR_meshopt_compression": {}}),
+                "the data is compressed (EXT_meshopt_compression)",
+            ),
+            (
+                "/meshes/0/primitives/0/attributes/POSITION",
+                json!(7),
+                "accessors[7]: the file names",
+            ),
+            ("/meshes/0/primitives/0/indices", json!(-1), "accessors[-1]"),
+            ("/nodes/0/mesh", json!(1), "meshes[1]"),
+            ("/nodes/0/mesh", json!("x"), "invalid type"),
+            ("/nodes/0/children", json!([0]), "two parents"),
+            ("/nodes/0/scale", json!([1e300, 1e300, 1]), "a vertex lies at"),
+            ("/scenes/0/nodes", json!([4]), "nodes[4]"),
+            (
+                "/accessors/0/type",
+                json!("VEC2"),
+                "accessors[0]: the type is \"VEC2\". Expected VEC3",
+            ),
+            ("/accessors/0/componentType", json!(5130), "a componentType is 5130"),
+            ("/accessors/0/count", json!(1e6), "do not lie in their buffer"),
+            ("/accessors/0/count", json!(1e15), "more than 2^30 numbers"),
+            ("/accessors/0/count", json!(0), "do not lie in their buffer"),
+            ("/accessors/0/byteOffset", json!(1.5), "do not lie in their buffer"),
+            ("/bufferViews/0/byteStride", json!(2), "do not lie in their buffer"),
+            ("/bufferViews/0/byteLength", json!(-4), "do not lie in their buffer"),
+            ("/buffers/0/uri", json!("data:x;base64,A"), "not base64"),
+            ("/buffers/0", json!({}), "no data"),
+            ("/meshes/0/primitives/0/attributes", json!({}), "no triangles"),
+        ] {
+            let mut changed = file.clone();
+            let (parent, key) = pointer.rsplit_once('/').unwrap();
+            let parent = changed.pointer_mut(parent).unwrap();
+            match parent.as_array_mut() {
+                Some(list) => list[key.parse::<usize>().unwrap()] = value,
+                None => parent[key] = value,
+            }
+            let error = match read_in(Path::new("/nowhere"), &changed) {
+                Err(error) => error.to_string(),
+                Ok(mesh) => format!("accepted: {mesh:?}"),
+            };
+            assert!(error.contains(words), "{pointer}: {error}");
         }
-    }
-}
-
-/// Elements of a glTF accessor: `count` of `size` bytes each, which begin every `stride` bytes.
-/// [`Part::slice`] has checked that they are inside the accessor's buffer.
-#[derive(Clone, Copy)]
-struct Slice<'a> {
-    bytes: &'a [u8],
-    stride: usize,
-    kind: DataType,
-    count: usize,
-}
-
-impl Slice<'_> {
-    /// Returns the numbers of element `i`.
-    fn numbers<const N: usize>(&self, i: usize) -> [f64; N] {
-        let size = self.kind.size();
-        std::array::from_fn(|k| match self.bytes[i * self.stride + k * size..][..size] {
-            [a] => a.into(),
-            [a, b] => u16::from_le_bytes([a, b]).into(),
-            [a, b, c, d] if self.kind == DataType::U32 => u32::from_le_bytes([a, b, c, d]).into(),
-            [a, b, c, d] => f32::from_le_bytes([a, b, c, d]).into(),
-            _ => f64::NAN,
-        })
+        let mut file = file;
+        file["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(0);
+        file["meshes"][0]["primitives"][0]["material"] = json!(0);
+        let texture = json!({"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0, 0, 1]});
+        file["materials"] = json!([{"pbrMetallicRoughness": texture}]);
+        let copy = file["meshes"][0]["primitives"][0].clone();
+        file["meshes"][0]["primitives"].as_array_mut().unwrap().push(copy);
+        file["meshes"][0]["primitives"].as_array_mut().unwrap().push(json!({"mode": 1}));
+        let mesh = read(&file);
+        assert_eq!(mesh.color(0), Some([0.5, 0.0, 0.0]));
+        assert_eq!(
+            mesh.notes,
+            [
+                "the colours of the vertices of a part were not read (2 times)",
+                "the base colour texture of a part was not read (2 times)",
+                "points and lines were left out"
+            ]
+        );
     }
 
-    /// Returns the stored number that means the texture coordinate 1: 255 or 65535 for integers, 1
-    /// for floats.
-    fn largest(&self) -> f64 {
-        match self.kind {
-            DataType::U8 => 255.0,
-            DataType::U16 => 65535.0,
-            _ => 1.0,
+    #[test]
+    fn gltf_skins_morphs_and_instances_are_applied() {
+        let (mut parts, _) = square();
+        let shift = parts.accessor(5126, &SQUARE);
+        let joints = parts.accessor(5121, &[&[0.0, 1.0, 0.0, 0.0] as &[f64]; 4]);
+        let weights = parts.accessor(5126, &[&[0.25, 0.75, 0.0, 0.0] as &[f64]; 4]);
+        let to = |x: f64| DMat4::from_translation(DVec3::new(x, 0.0, 0.0)).to_cols_array();
+        let inverse = parts.accessor(5126, &[&to(-1.0)[..], &to(-2.0)]);
+        let places = parts.accessor(5126, &[&[0.0, 0.0, 0.0], &[0.0, 0.0, 5.0]]);
+        let file = parts.file(json!({"POSITION": 0, "JOINTS_0": joints, "WEIGHTS_0": weights}));
+        let bounds = |change: &dyn Fn(&mut Value)| {
+            let mut file = file.clone();
+            file["nodes"][0]["translation"] = json!([0, 7, 0]);
+            change(&mut file);
+            read(&file).bounds
+        };
+        assert_eq!(bounds(&|_| {}), [[0.0, 7.0, 0.0], [1.0, 8.0, 0.0]]);
+        // Joints at x = 5 and x = 9 move the mesh by a quarter of 4 and three quarters of 7.
+        let with_skin = |file: &mut Value| {
+            file["nodes"][0]["skin"] = json!(0);
+            file["skins"] = json!([{"joints": [1, 2], "inverseBindMatrices": inverse}]);
+            let nodes = file["nodes"].as_array_mut().unwrap();
+            nodes.push(json!({"translation": [5, 0, 0], "children": [2]}));
+            nodes.push(json!({"translation": [4, 0, 0]}));
+            file["scenes"][0]["nodes"] = json!([0, 1]);
+        };
+        assert_eq!(bounds(&with_skin), [[6.25, 0.0, 0.0], [7.25, 1.0, 0.0]]);
+        for (list, weight, size) in
+            [("nodes", 1.0, 2.0), ("meshes", 0.5, 1.5), ("meshes", 0.0, 1.0)]
+        {
+            let morphed = |file: &mut Value| {
+                file["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": shift}]);
+                file[list][0]["weights"] = json!([weight]);
+            };
+            assert_eq!(bounds(&morphed), [[0.0, 7.0, 0.0], [size, 7.0 + size, 0.0]], "{list}");
         }
+        let instanced = |file: &mut Value| {
+            let attributes = json!({"attributes": {"TRANSLATION": places}});
+            file["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": attributes});
+            file["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
+        };
+        assert_eq!(bounds(&instanced), [[0.0, 7.0, 0.0], [1.0, 8.0, 5.0]]);
+    }
+
+    #[test]
+    fn gltf_binary_files_are_read() {
+        let (parts, mut file) = square();
+        file["buffers"][0].as_object_mut().unwrap().remove("uri");
+        let chunk =
+            |name: &[u8], data: &[u8]| [&(data.len() as u32).to_le_bytes(), name, data].concat();
+        let json = file.to_string().into_bytes();
+        let glb =
+            [b"glTF\x02\0\0\0\0\0\0\0", &chunk(b"JSON", &json)[..], &chunk(b"BIN\0", &parts.bytes)]
+                .concat();
+        let read = |bytes: &[u8]| {
+            parse(&FileContents { path: PathBuf::from("a.glb"), bytes: bytes.to_vec() })
+        };
+        assert_eq!(read(&glb).unwrap().triangles.len(), 2);
+        assert!(read(&glb[..glb.len() - 1]).unwrap_err().found.contains("no data"));
+        for end in [0, 4, 11, 19, 40] {
+            assert!(read(&glb[..end]).is_err());
+        }
+        let mut old = glb;
+        old[4] = 1;
+        assert!(read(&old).unwrap_err().found.contains("version"));
     }
 }

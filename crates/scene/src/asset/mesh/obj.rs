@@ -377,7 +377,10 @@ mod tests {
             ("mtllib ../x.mtl\n", "no colours: \"../x.mtl\" is not in the mesh's folder"),
             ("f 1 2\nf 1\n", "a face of fewer than three corners was left out (2 times)"),
             ("f 1 1 2\n", "a triangle without area was left out"),
-            ("v 0 1.5 0\nf 1 3 2 5\n", "a polygon whose outline crosses itself is uncertain"),
+            (
+                "v 0 1.5 0\nf 1 3 2 5\n",
+                "a polygon whose outline crosses itself or is too long is uncertain",
+            ),
             ("v 2 2 2 1 0 0\n", "a colour of a vertex was not read"),
             ("v 2 2 2 1 0 0 1\n", "a colour of a vertex was not read"),
             ("l 1 2 3\np 1\n", "points and lines were left out (2 times)"),

@@ -8,6 +8,9 @@ use glam::{DVec2, DVec3};
 /// more.
 const TESTS_PER_CORNER: usize = 2000;
 
+/// Largest number of corners of a polygon that is divided. It bounds the memory.
+pub const MAX_CORNERS: usize = 1 << 20;
+
 /// Triangles of a polygon, as indices of its corners.
 pub struct Division {
     pub triangles: Vec<[usize; 3]>,
