@@ -88,6 +88,16 @@ pub struct Notice {
     pub until: Option<Duration>,
 }
 
+/// Returns a notice of what the readers of the scene's files left out; `None` if that is nothing.
+pub fn file_notice(scene: &Scene) -> Option<String> {
+    let notes = scene.file_notes();
+    let (_, first) = notes.first()?;
+    match notes.len() {
+        1 => Some(first.clone()),
+        n => Some(format!("{first} (and {} more: `zerkalo check`)", n - 1)),
+    }
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchTable {
     pub report: WatchReport,
@@ -202,7 +212,13 @@ impl Model {
         };
         let name = path.as_deref().map_or(sanitized(name), short_name);
         let unreadable = broken.is_some();
+        let notice = file_notice(&scene);
         Self {
+            notice: notice.map(|text| Notice {
+                text: sanitized(&text),
+                tone: Tone::Bad,
+                until: None,
+            }),
             file: File {
                 path,
                 name,

@@ -204,6 +204,17 @@ fn files_named_by_meshes_stay_in_their_folder() {
         assert_eq!(run.status, 1, "{uri}: {}", run.out);
         assert!(run.err.contains("folder"), "{uri}: {}", run.err);
     }
+    // Without its colours, a mesh keeps its shape.
+    fs::write(desk.path("secret.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
+    let obj = "mtllib ../secret.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+    fs::write(desk.path("meshes/m.obj"), obj).unwrap();
+    fs::write(desk.path("mesh.toml"), with_mesh("meshes/m.obj")).unwrap();
+    let render = ["render", "mesh.toml", "-o", "a.png", "--spp", "2", "--size", "16x12"];
+    for args in [&["check", "mesh.toml"][..], &render] {
+        let run = desk.run(args);
+        assert_eq!(run.status, 0, "{}", run.err);
+        assert!(run.err.contains("\"../secret.mtl\" is not in the mesh's folder"), "{}", run.err);
+    }
 }
 
 #[test]

@@ -105,7 +105,11 @@ and every key with a default may be left out. Unknown keys are errors.
   file, and `..`, absolute paths and symbolic links are followed, as in a shell. Only regular files
   are read, so that no device or pipe blocks; their content goes into the picture and into messages
   only. A file that a mesh file names in turn lies in the folder of that mesh file or below: such a
-  name has no `..`, is not absolute, and is no URL.
+  name has no `..`, is not absolute, and is no URL. A library of colours elsewhere is left out with a
+  warning; a buffer of vertices elsewhere is an error.
+- What the reader of a mesh file leaves out or replaces is a warning: points and lines, textures, colours
+  of vertices, extensions of glTF that change neither shape nor colour, triangles without area, normals and
+  texture coordinates that are no numbers. Of a polygon any shape in a plane is filled, also with cuts to holes.
 - An environment light is infinitely far away in all directions. It adds to the background, lights diffuse
   surfaces, makes highlights, and is seen by the camera and in mirrors unless `visible = false`. Its image
   is equirectangular: the top row is up (+y), the middle is towards -z, a quarter to the right of the middle

@@ -120,6 +120,30 @@ fn external_change_reloads_unless_edits_would_be_lost() {
 }
 
 #[test]
+fn notes_about_mesh_files_are_shown_when_they_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, lines: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n{lines}")).unwrap();
+        format!("[[object]]\nshape.mesh.file = {path:?}\n")
+    };
+    let (noted, plain) =
+        (write("noted.obj", "l 1 2\nl 2 3\nv 0 0 0 1 0 0\n"), write("plain.obj", ""));
+    let notice = |model: &Model| model.notice.as_ref().map_or("", |n| &n.text).to_string();
+    let note =
+        "noted.obj\": points and lines were left out (2 times) (and 1 more: `zerkalo check`)";
+    let mut model = start(Some(FILE), &(ROOM.to_string() + &noted));
+    assert!(notice(&model).contains(note), "{}", notice(&model));
+    press(&mut model, "Left");
+    assert_eq!(notice(&model), "");
+    for (text, expected) in [(plain, "read "), (noted, note)] {
+        let scene = Scene::parse(&(ROOM.to_string() + &text), FILE).map(Arc::new);
+        update(&mut model, Message::Loaded(Box::new(scene)), Duration::ZERO);
+        assert!(notice(&model).contains(expected), "{}", notice(&model));
+    }
+}
+
+#[test]
 fn unreadable_file_loads_after_it_is_fixed() {
     let broken = ROOM.replace("radius = 0.5", "radius = -1");
     let mut model = start(Some(FILE), &broken);

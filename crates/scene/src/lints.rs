@@ -7,6 +7,8 @@ use crate::light::Light;
 use crate::material::{Fresnel, Highlight, Material};
 use crate::validate::Problem;
 use crate::value::{Color, number};
+use std::collections::HashSet;
+use std::sync::Arc;
 
 /// Path of a doubtful value, and a phrase such as `alpha has no effect here`.
 type Case = (Vec<String>, String);
@@ -79,7 +81,28 @@ impl Scene {
             let help = "The picture will be black. A light begins with [[light]].";
             problems.push(self.problem(&[], found.into(), help.into()));
         }
+        for (path, note) in self.file_notes() {
+            let path: Vec<&str> = path.iter().map(String::as_str).collect();
+            problems.push(self.problem(&path, note, String::new()));
+        }
         problems
+    }
+
+    /// Returns what the readers of mesh files left out or replaced: the path of a key that names
+    /// the file, and a phrase with the name of the file.
+    pub fn file_notes(&self) -> Vec<(Vec<String>, String)> {
+        let mut known = HashSet::new();
+        let objects = self.objects.iter().enumerate().filter_map(|(i, object)| {
+            let mesh = object.shape.mesh()?;
+            let notes = known.insert(Arc::as_ptr(mesh)).then_some(&mesh.mesh.notes)?;
+            let path = ["object", &i.to_string(), "shape", "mesh", "file"].map(str::to_string);
+            Some((path.to_vec(), object.shape.file()?, notes))
+        });
+        let note = |(path, file, notes): (Vec<String>, &str, &Vec<String>)| {
+            let note = |note: &String| (path.clone(), format!("\"{file}\": {note}"));
+            notes.iter().map(note).collect::<Vec<_>>()
+        };
+        objects.flat_map(note).collect()
     }
 }
 
@@ -108,4 +131,31 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
         );
         (key, found)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Document;
+    use crate::asset::Assets;
+    use std::sync::Arc;
+
+    #[test]
+    fn notes_of_mesh_readers_are_warnings_of_the_first_object() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        write("a.obj", "mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\nl 2 3\n");
+        let object = "[[object]]\nshape.mesh = { file = \"a.obj\" }\n";
+        let text = format!("ambient.color = [1, 1, 1]\n{object}{object}");
+        let document =
+            Document::read(&write("s.toml", &text), Arc::new(Assets::default())).unwrap();
+        let warnings: Vec<_> = document.warnings.iter().map(ToString::to_string).collect();
+        assert_eq!(warnings.len(), 2, "{warnings:?}");
+        assert!(warnings[0].contains("s.toml:3:23") && warnings[0].contains("none.mtl"));
+        let lines = "\"a.obj\": points and lines were left out (2 times)";
+        assert!(warnings[1].contains(lines), "{warnings:?}");
+    }
 }

@@ -1,6 +1,6 @@
 //! Undo, saving, reloading and quitting, and the results of saves, loads and exports.
 
-use crate::dashboard::model::{Tone, first_line};
+use crate::dashboard::model::{Tone, file_notice, first_line};
 use crate::dashboard::{Answer, Effect, Exported, UpdateContext, short_name};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -143,7 +143,10 @@ impl UpdateContext<'_> {
                 self.model.inspector.editor = None;
                 self.select(found.unwrap_or(Target::Camera));
                 self.show();
-                self.say(format!("read {}", self.model.file.name));
+                match file_notice(self.scene()) {
+                    Some(notice) => self.notify(Tone::Bad, notice, None),
+                    None => self.say(format!("read {}", self.model.file.name)),
+                }
             }
             Err(errors) => {
                 let text = first_line(&errors);

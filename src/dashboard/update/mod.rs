@@ -18,7 +18,7 @@ mod recovery;
 mod render;
 mod watch;
 
-use crate::dashboard::model::{Notice, Tone};
+use crate::dashboard::model::{Notice, Tone, file_notice};
 use crate::dashboard::panel_lines::{outline, outline_position, scrolled, walked};
 use crate::dashboard::{Effect, FieldList, Message, Model, Overlay};
 use files::capital;
@@ -177,8 +177,10 @@ impl UpdateContext<'_> {
     /// Stores the edited scene in the open form, or else in the undo history. Returns `true` if the
     /// scene has changed.
     fn record(&mut self, edit: Edit, coalesce: Coalesce) -> bool {
-        if let Some(note) = &edit.note {
-            self.say(note.clone());
+        let known = file_notice(self.scene());
+        match file_notice(&edit.scene).filter(|notice| known.as_ref() != Some(notice)) {
+            Some(notice) => self.notify(Tone::Bad, notice, None),
+            None => edit.note.iter().for_each(|note| self.say(note.clone())),
         }
         let scene = Arc::new(edit.scene);
         if let Some(Overlay::Form(form)) = &mut self.model.overlay {
