@@ -17,7 +17,7 @@ use std::sync::atomic::AtomicBool;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo_kernel::primitive::Mesh;
-use zerkalo_kernel::primitive::{Aggregate, Form, MeshForm};
+use zerkalo_kernel::primitive::{Aggregate, Form, MeshForm, MeshNormals};
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::film::{Display, Estimator, Film, Header, LightWeights};
 use zerkalo_render::pass::{self, PassContext};
@@ -113,7 +113,10 @@ fn main() {
     }
     let mesh = Arc::new(Mesh::new(ball(132, 266)));
     let scene_from_mesh = DAffine3::IDENTITY;
-    forms.push(("mesh of 69,692", Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth: false })));
+    forms.push((
+        "mesh of 69,692",
+        Form::Mesh(MeshForm { mesh, scene_from_mesh, normals: MeshNormals::Flat }),
+    ));
     for (name, form) in &forms {
         let rays = rays_towards(form);
         let mut tracers = (

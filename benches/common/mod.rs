@@ -89,6 +89,7 @@ pub fn ball(rings: usize, sides: usize) -> TriangleMesh {
         center: [0.0; 3],
         triangles,
         normals: None,
+        is_flat: false,
         uvs: None,
         colors: Vec::new(),
         color_of: Vec::new(),

@@ -72,7 +72,11 @@ fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
 /// the mesh, an ellipsoid with the half-axes `axes`.
 fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize) -> usize {
     const BLOCK: usize = 1 << 14;
-    let form = Form::Mesh(MeshForm { mesh: mesh.clone(), scene_from_mesh: place, smooth: false });
+    let form = Form::Mesh(MeshForm {
+        mesh: mesh.clone(),
+        scene_from_mesh: place,
+        normals: MeshNormals::Flat,
+    });
     let geometry = Aggregate::<L>::new(&[form]);
     let triangles = &mesh.mesh.triangles;
     let corner = |i: u32| DVec3::from(mesh.mesh.positions[i as usize].map(f64::from));

@@ -35,8 +35,8 @@ pub use toml::{Table, Value};
 pub use zerkalo_kernel::bvh::{Hit, Ray};
 pub use zerkalo_kernel::lanes::{Double, Float, Frame, Mask, SimdFloat, Single, Vec3};
 pub use zerkalo_kernel::primitive::{
-    Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, EllipsoidForm, Form, MeshForm, PlaneForm,
-    SphereForm, SurfacePoint,
+    Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, EllipsoidForm, Form, MeshForm,
+    MeshNormals, PlaneForm, SphereForm, SurfacePoint,
 };
 pub use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
 pub use zerkalo_render::export::Provenance;

@@ -40,35 +40,58 @@ fn misses([low, high]: &[DVec3; 2], origin: DVec3, direction: DVec3) -> bool {
 }
 
 /// Returns the normals at the corners of all triangles. Each is the normalised sum of the unit
-/// normals of adjacent triangles, weighted by their angles at the corner.
-fn around(corners: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
+/// normals of adjacent triangles, weighted by their angles at the corner. Only triangles
+/// count that are reached around the corner by sides whose triangles differ by at most
+/// `crease_angle` \[degrees\].
+fn around(corners: &[[DVec3; 3]], crease_angle: f64) -> Vec<[DVec3; 3]> {
     let key = |p: DVec3| p.to_array().map(|x| (x + 0.0).to_bits());
-    let mut sums: HashMap<[u64; 3], DVec3> = HashMap::new();
-    for triangle in corners {
-        for i in 0..3 {
-            let [a, b, c] = [0, 1, 2].map(|k| triangle[(i + k) % 3]);
-            let normal = (b - a).cross(c - a).normalize();
-            *sums.entry(key(a)).or_default() += normal * (b - a).angle_between(c - a);
-        }
+    let normal =
+        |t: usize| (corners[t][1] - corners[t][0]).cross(corners[t][2] - corners[t][0]).normalize();
+    let mut at: HashMap<[u64; 3], Vec<usize>> = HashMap::new();
+    for (t, triangle) in corners.iter().enumerate() {
+        triangle.iter().for_each(|p| at.entry(key(*p)).or_default().push(t));
     }
-    corners.iter().map(|triangle| triangle.map(|p| sums[&key(p)].normalize())).collect()
+    let angle = |t: usize, p: DVec3| {
+        let i = corners[t].iter().position(|q| key(*q) == key(p)).unwrap();
+        let [a, b, c] = [0, 1, 2].map(|k| corners[t][(i + k) % 3]);
+        (b - a).angle_between(c - a)
+    };
+    let shared = |a: usize, b: usize| {
+        corners[a].iter().filter(|p| corners[b].iter().any(|q| key(**p) == key(*q))).count()
+    };
+    let of = |t: usize, p: DVec3| -> DVec3 {
+        let all = &at[&key(p)];
+        let mut reached = vec![t];
+        for next in 0.. {
+            let Some(from) = reached.get(next).copied() else { break };
+            for u in all {
+                let bend = normal(from).angle_between(normal(*u)).to_degrees();
+                if !reached.contains(u) && shared(from, *u) == 2 && bend < crease_angle + 1e-4 {
+                    reached.push(*u);
+                }
+            }
+        }
+        reached.iter().map(|u| normal(*u) * angle(*u, p)).sum()
+    };
+    (0..corners.len()).map(|t| corners[t].map(|p| of(t, p).normalize())).collect()
 }
 
 impl Triangles {
     pub fn new(file: &MeshDesc) -> Self {
-        let Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth }) = file.form() else {
+        let Form::Mesh(MeshForm { mesh, scene_from_mesh, normals }) = file.form() else {
             unreachable!("a mesh description has a mesh form")
         };
         let mesh = &mesh.mesh;
         let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
         let place = |i: u32| scene_from_mesh.transform_point3(vector(mesh.positions[i as usize]));
         let corners: Vec<_> = mesh.triangles.iter().map(|t| t.map(place)).collect();
-        let normals = match &mesh.normals {
-            _ if !smooth => Vec::new(),
-            Some(given) => {
+        let normals = match (normals, &mesh.normals) {
+            (MeshNormals::Flat, _) => Vec::new(),
+            (MeshNormals::Creased(degrees), _) => around(&corners, degrees),
+            (MeshNormals::OfVertices, Some(given)) => {
                 mesh.triangles.iter().map(|t| t.map(|i| vector(given[i as usize]))).collect()
             }
-            None => around(&corners),
+            (MeshNormals::OfVertices, None) => unreachable!("the form has normals of its file"),
         };
         let pair = |i: u32, given: &[[f32; 2]]| DVec2::from(given[i as usize].map(f64::from));
         let uvs = mesh

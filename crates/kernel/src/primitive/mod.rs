@@ -35,7 +35,7 @@ pub use convex_polyhedron::ConvexPolyhedronForm;
 pub use csg::{CsgSolid, CsgTree, Solid};
 pub use ellipsoid::EllipsoidForm;
 pub use form::Form;
-pub use mesh::instance::MeshForm;
+pub use mesh::instance::{MeshForm, MeshNormals};
 pub use mesh::{Mesh, TriangleMesh};
 pub use parallelogram::ParallelogramForm;
 pub use plane::PlaneForm;

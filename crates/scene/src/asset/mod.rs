@@ -19,8 +19,10 @@ mod radiance_map;
 
 pub use cache::{Assets, LoadProgress};
 pub use error::{AssetError, FileLocation};
+pub(crate) use file::FileContents;
 pub use file::MAX_BYTES;
 pub use image::{Image, MAX_PIXELS, MAX_SIDE};
 pub use loaded::Loaded;
+pub(crate) use mesh::{CREASE_ANGLE, parse as parse_mesh};
 pub use mesh::{MAX_TRIANGLES, MAX_VERTICES};
 pub use radiance_map::RadianceMap;

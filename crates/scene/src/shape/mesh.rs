@@ -1,11 +1,11 @@
 //! Triangle meshes from files.
 
-use crate::asset::{AssetError, Loaded};
+use crate::asset::{AssetError, CREASE_ANGLE, FileContents, Loaded, parse_mesh};
 use crate::shape::{Shape, ShapeDesc};
 use crate::value::{choices, description};
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 use std::sync::{Arc, LazyLock};
-use zerkalo_kernel::primitive::{Form, Mesh, MeshForm, TriangleMesh};
+use zerkalo_kernel::primitive::{Form, Mesh, MeshForm, MeshNormals};
 
 description! {
     /// Triangles from a file: OBJ (with the colours of its MTL), PLY, STL, glTF or GLB. Placed by
@@ -15,15 +15,20 @@ description! {
         /// Name of the file, relative to the folder of the scene file. Empty: an icosahedron.
         file: String = "";
         /// Normals used for shading: curved triangles or flat ones.
-        normals: Normals = "smooth";
+        normals: Normals = "auto";
+        /// Largest angle between two triangles that "auto" shades as one curved surface. If it is
+        /// given, normals in the file are not used.
+        crease_angle: Option<f64>, or "normals of the file, else 40, in glTF 0", in closed(0.0, 180.0) "degrees";
         loads content: Loaded<Mesh>;
-        example "shape.mesh = { file = \"scenes/meshes/knot.ply\", normals = \"smooth\" }";
+        example "shape.mesh = { file = \"scenes/meshes/knot.ply\", normals = \"auto\", crease_angle = 50.0 }";
     }
 }
 
 choices! {
     /// Kind of the shading normals of a mesh.
     pub enum Normals {
+        /// those of the file, else smooth with creases at sharp edges; glTF without normals is flat
+        Auto = "auto",
         /// normals of the vertices, interpolated: those of the file, else the means of the adjacent
         /// triangles
         Smooth = "smooth",
@@ -34,44 +39,9 @@ choices! {
 
 /// Placeholder mesh: an icosahedron of height 1 that stands on the origin.
 static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
-    let golden = 0.5 * (1.0 + 5.0f64.sqrt());
-    let mut corners = Vec::new();
-    for axis in 0..3 {
-        for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
-            let mut corner = [0.0; 3];
-            (corner[axis], corner[(axis + 1) % 3]) = (a, b);
-            corners.push(DVec3::from(corner));
-        }
-    }
-    // The edges have the squared length 4; all other squared distances of corners are above 10.
-    let near = |a: usize, b: usize| corners[a].distance_squared(corners[b]) < 4.1;
-    let mut triangles = Vec::new();
-    for a in 0..12 {
-        for b in (a + 1..12).filter(|b| near(a, *b)) {
-            for c in (b + 1..12).filter(|c| near(a, *c) && near(b, *c)) {
-                let [p, q, r] = [a, b, c].map(|i| corners[i]);
-                let outward = (q - p).cross(r - p).dot(p) > 0.0;
-                triangles.push(if outward { [a, b, c] } else { [a, c, b] }.map(|i| i as u32));
-            }
-        }
-    }
-    let place = |corner: &DVec3| *corner * (0.5 / golden) + DVec3::Y * 0.5;
-    let positions: Vec<_> =
-        corners.iter().map(|corner| place(corner).to_array().map(|x| x as f32)).collect();
-    let bound = |pick: fn(f32, f32) -> f32| {
-        [0, 1, 2].map(|axis| positions.iter().map(|p| p[axis]).fold(positions[0][axis], pick))
-    };
-    Arc::new(Mesh::new(TriangleMesh {
-        bounds: [bound(f32::min), bound(f32::max)],
-        positions,
-        center: [0.0; 3],
-        triangles,
-        normals: None,
-        uvs: None,
-        colors: Vec::new(),
-        color_of: Vec::new(),
-        notes: Vec::new(),
-    }))
+    let bytes = include_bytes!("icosahedron.obj").to_vec();
+    let mesh = parse_mesh(&FileContents { path: "icosahedron.obj".into(), bytes });
+    Arc::new(Mesh::new(mesh.expect("a valid mesh")))
 });
 
 impl MeshDesc {
@@ -84,9 +54,18 @@ impl MeshDesc {
 impl ShapeDesc for MeshDesc {
     fn form(&self) -> Form {
         let mesh = self.mesh().clone();
+        let in_file = mesh.mesh.normals.is_some();
+        let normals = match (self.normals, self.crease_angle) {
+            (Normals::Flat, _) => MeshNormals::Flat,
+            (Normals::Auto, Some(degrees)) => MeshNormals::Creased(degrees),
+            (Normals::Auto | Normals::Smooth, _) if in_file => MeshNormals::OfVertices,
+            (Normals::Smooth, _) => MeshNormals::Creased(180.0),
+            (Normals::Auto, None) if mesh.mesh.is_flat => MeshNormals::Flat,
+            (Normals::Auto, None) => MeshNormals::Creased(CREASE_ANGLE),
+        };
         Form::Mesh(MeshForm {
             scene_from_mesh: DAffine3::from_translation(mesh.mesh.center.into()),
-            smooth: self.normals == Normals::Smooth,
+            normals,
             mesh,
         })
     }
@@ -117,6 +96,7 @@ impl Shape {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
     #[test]
     fn placeholder_is_icosahedron_on_origin() {
@@ -126,6 +106,20 @@ mod tests {
         let (low, high) = form.bounds().unwrap();
         assert!((low - DVec3::new(-0.5, 0.0, -0.5)).length() < 1e-6, "{low}");
         assert!((high - DVec3::new(0.5, 1.0, 0.5)).length() < 1e-6, "{high}");
+        // The faces of an icosahedron meet at 41.8 degrees.
+        for (normals, crease_angle, expected) in [
+            (Normals::Auto, None, MeshNormals::Creased(40.0)),
+            (Normals::Auto, Some(50.0), MeshNormals::Creased(50.0)),
+            (Normals::Smooth, Some(50.0), MeshNormals::Creased(180.0)),
+            (Normals::Flat, None, MeshNormals::Flat),
+        ] {
+            let Form::Mesh(form) =
+                (MeshDesc { normals, crease_angle, ..Default::default() }).form()
+            else {
+                panic!("not a mesh");
+            };
+            assert_eq!(form.normals, expected);
+        }
         // All corners are at the same distance from the centre, and all fronts face outwards.
         let point =
             |i: u32| DVec3::from(mesh.positions[i as usize].map(f64::from)) - DVec3::Y * 0.5;

@@ -3,10 +3,10 @@
 
 use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
 use crate::primitive::canonical::Bounds;
-use crate::primitive::mesh::{TriangleMesh, smooth};
+use crate::primitive::mesh::{CornerNormals, TriangleMesh, creased};
 use glam::DVec3;
 use std::fmt;
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Leaf of a mesh's BVH. The coordinates of unused slots are NaN.
 #[derive(Clone, Debug)]
@@ -27,7 +27,8 @@ pub struct Mesh {
     pub leaves: Vec<TriangleBlock>,
     /// Index of the first triangle of each leaf.
     pub firsts: Vec<u32>,
-    smooth: OnceLock<Vec<[f32; 3]>>,
+    /// Computed normals by crease angle \[degrees\].
+    creased: Mutex<Vec<(f64, Arc<CornerNormals>)>>,
 }
 
 /// Two meshes are equal only if they are the same allocation.
@@ -79,16 +80,21 @@ impl Mesh {
         let firsts = leaves.iter().map(|(first, _)| *first).collect();
         let leaves =
             leaves.iter().map(|(first, count)| TriangleBlock::new(&mesh, *first, *count)).collect();
-        Self { mesh, boxes, leaves, firsts, smooth: OnceLock::new() }
+        Self { mesh, boxes, leaves, firsts, creased: Mutex::default() }
     }
 
-    /// Returns a unit normal per vertex: the normals of the file, or else the mean normals of the
-    /// adjacent triangles, which the first call computes.
-    pub fn smooth_normals(&self) -> &[[f32; 3]] {
-        match &self.mesh.normals {
-            Some(normals) => normals,
-            None => self.smooth.get_or_init(|| smooth(&self.mesh.positions, &self.mesh.triangles)),
-        }
+    /// Returns normals that are smooth except at creases above an angle, which the first call
+    /// computes. The last few angles are kept.
+    pub fn creased_normals(&self, degrees: f64) -> Arc<CornerNormals> {
+        let mut known = self.creased.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = known.iter().position(|(angle, _)| *angle == degrees);
+        let entry = found.map(|i| known.remove(i)).unwrap_or_else(|| {
+            (degrees, Arc::new(creased(&self.mesh.positions, &self.mesh.triangles, degrees)))
+        });
+        let normals = Arc::clone(&entry.1);
+        known.truncate(3);
+        known.insert(0, entry);
+        normals
     }
 
     /// Returns the largest dot product of `direction` with a corner of a triangle: the support
@@ -147,6 +153,8 @@ impl Mesh {
         self.mesh.bytes()
             + self.boxes.bytes()
             + (size_of::<TriangleBlock>() + size_of::<u32>()) * self.leaves.len()
-            + self.smooth.get().map_or(0, |n| 12 * n.len())
+            + self.creased.try_lock().map_or(0, |known| {
+                known.iter().map(|(_, n)| 12 * (n.normals.len() + n.corners.len())).sum()
+            })
     }
 }

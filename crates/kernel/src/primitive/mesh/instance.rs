@@ -11,13 +11,24 @@ use crate::primitive::canonical::{
 };
 use crate::primitive::compiled::{Primitive, SurfacePoint, TexCoord};
 use crate::primitive::keep_visible;
-use crate::primitive::mesh::{Mesh, intersection};
+use crate::primitive::mesh::{CornerNormals, Mesh, TriangleMesh, intersection};
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 
 /// Assumed ratio of a mesh's extent to the size of its smallest details, for the choice of single
 /// or double precision.
 const EXTENT_PER_DETAIL: f64 = 64.0;
+
+/// Shading normals of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MeshNormals {
+    /// Normal of each triangle.
+    Flat,
+    /// Normals of the vertices in the file, interpolated.
+    OfVertices,
+    /// Means of the adjacent triangles, divided by creases above this angle \[degrees\].
+    Creased(f64),
+}
 
 /// Image of a triangle mesh under an invertible affine map.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,8 +37,8 @@ pub struct MeshForm {
     pub mesh: Arc<Mesh>,
     /// Map from the space of the mesh to the scene.
     pub scene_from_mesh: DAffine3,
-    /// `true` if shading normals are interpolated between vertices.
-    pub smooth: bool,
+    /// Normals for shading.
+    pub normals: MeshNormals,
 }
 
 impl MeshForm {
@@ -136,6 +147,7 @@ pub struct MeshInstance<S> {
     reach: S,
     /// `true` if shading normals are interpolated between vertices.
     pub smooth: bool,
+    creased: Option<Arc<CornerNormals>>,
 }
 
 /// Corners of one mesh triangle per lane, in the space of the mesh.
@@ -146,7 +158,7 @@ struct Triangle<L> {
 impl<S: Float> MeshInstance<S> {
     /// Compiles a placed mesh; `None` for a mesh without finite bounds.
     pub fn of(form: &MeshForm) -> Option<Self> {
-        let MeshForm { mesh, scene_from_mesh, smooth } = form;
+        let MeshForm { mesh, scene_from_mesh, normals } = form;
         let [low, high] = mesh.mesh.bounds.map(|c| DVec3::from(c.map(f64::from)));
         let middle = (0.5 * (low + high)).as_vec3().as_dvec3();
         let inverse = scene_from_mesh.matrix3.inverse();
@@ -167,7 +179,11 @@ impl<S: Float> MeshInstance<S> {
             center: scene_from_mesh.transform_point3(middle).to_array().map(S::from_f64),
             mesh_center: middle.to_array().map(S::from_f64),
             reach: S::from_f64(outer.max(inner)),
-            smooth: *smooth,
+            smooth: *normals != MeshNormals::Flat,
+            creased: match normals {
+                MeshNormals::Creased(degrees) => Some(mesh.creased_normals(*degrees)),
+                MeshNormals::Flat | MeshNormals::OfVertices => None,
+            },
         })
     }
 
@@ -199,18 +215,21 @@ impl<S: Float> MeshInstance<S> {
         (Ray { origin: self.point(ray.origin), direction }, length)
     }
 
-    /// Returns a vertex attribute of `N` numbers at the three vertices of the triangle with the id
-    /// `triangle_tag`.
+    /// Returns an attribute of `N` numbers at the three corners of the triangle `triangle_tag`.
+    /// `corners` has the indices in `of_vertices` of each triangle.
     #[inline(always)]
     fn attribute<const N: usize, L: SimdFloat<Scalar = S>>(
         &self,
         triangle_tag: L,
+        corners: &[[u32; 3]],
         of_vertices: &[[f32; N]],
     ) -> [[L; N]; 3] {
         // Indices: vertex, component, lane. Each triangle and each vertex is read once.
         let mut values = [[[S::default(); MAX_WIDTH]; N]; 3];
         for lane in 0..L::WIDTH {
-            for (vertex, values) in self.vertices(triangle_tag, lane).into_iter().zip(&mut values) {
+            // A lane that hits another primitive may hold any triangle id.
+            let triangle = (triangle_tag.id_lane(lane) as usize).min(corners.len() - 1);
+            for (vertex, values) in corners[triangle].into_iter().zip(&mut values) {
                 for (x, values) in of_vertices[vertex as usize].into_iter().zip(values) {
                     values[lane] = S::from_f64(f64::from(x));
                 }
@@ -221,26 +240,11 @@ impl<S: Float> MeshInstance<S> {
         [a, b, c].map(|components| components.each_ref().map(vector))
     }
 
-    /// Returns the vertices of the triangle in one lane. A lane that hits another primitive may
-    /// hold any triangle id, which is clamped to a valid one.
-    #[inline(always)]
-    fn vertices<L: SimdFloat<Scalar = S>>(&self, triangle_tag: L, lane: usize) -> [u32; 3] {
-        let triangles = &self.mesh.mesh.triangles;
-        triangles[(triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1)]
-    }
-
-    #[inline(always)]
-    fn vectors<L: SimdFloat<Scalar = S>>(
-        &self,
-        triangle_tag: L,
-        of_vertices: &[[f32; 3]],
-    ) -> [Vec3<L>; 3] {
-        self.attribute(triangle_tag, of_vertices).map(|[x, y, z]| Vec3::new(x, y, z))
-    }
-
     #[inline(always)]
     fn triangle<L: SimdFloat<Scalar = S>>(&self, triangle_tag: L) -> Triangle<L> {
-        Triangle { corners: self.vectors(triangle_tag, &self.mesh.mesh.positions) }
+        let TriangleMesh { triangles, positions, .. } = &self.mesh.mesh;
+        let corners = self.attribute(triangle_tag, triangles, positions);
+        Triangle { corners: corners.map(|[x, y, z]| Vec3::new(x, y, z)) }
     }
 }
 
@@ -327,7 +331,8 @@ impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
 
     #[inline(never)]
     fn uv(&self, triangle: L, point: Vec3<L>) -> Option<TexCoord<L>> {
-        let corners = self.attribute(triangle, self.mesh.mesh.uvs.as_deref()?);
+        let mesh = &self.mesh.mesh;
+        let corners = self.attribute(triangle, &mesh.triangles, mesh.uvs.as_deref()?);
         let triangle = self.triangle(triangle);
         let weights = triangle.weights(self.point(point));
         let gradient = triangle.gradients();
@@ -354,7 +359,13 @@ impl<S: Float> MeshInstance<S> {
             return at.normal;
         }
         let weights = self.triangle(triangle).weights(self.point(at.point));
-        let [a, b, c] = self.vectors(triangle, self.mesh.smooth_normals());
+        let (corners, normals) = match (&self.creased, &self.mesh.mesh.normals) {
+            (Some(creased), _) => (&creased.corners, &creased.normals),
+            (None, Some(normals)) => (&self.mesh.mesh.triangles, normals),
+            (None, None) => return at.normal,
+        };
+        let normals = self.attribute(triangle, corners, normals);
+        let [a, b, c] = normals.map(|[x, y, z]| Vec3::new(x, y, z));
         let smooth = self.normal(a * weights[0] + b * weights[1] + c * weights[2]);
         let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
         // `smooth` is NaN if the vertex normals cancel or the triangle has no area. `keep_visible`

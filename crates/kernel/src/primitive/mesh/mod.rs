@@ -6,7 +6,7 @@ pub mod intersection;
 mod normals;
 
 pub use bvh::{Mesh, TriangleBlock};
-pub use normals::smooth;
+pub use normals::{CornerNormals, creased};
 
 /// Triangle mesh that was checked: it has at least one triangle, all indices are in range, all
 /// numbers are finite, and every triangle has an area.
@@ -21,6 +21,8 @@ pub struct TriangleMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Unit normal per vertex. `None` if the file has no normals.
     pub normals: Option<Vec<[f32; 3]>>,
+    /// `true` if a mesh without normals is flat by the rules of its format.
+    pub is_flat: bool,
     /// Texture coordinates per vertex, u to the right and v upwards. `None` if the file has none.
     pub uvs: Option<Vec<[f32; 2]>>,
     /// Distinct linear base colours of triangles. Empty if the file has no colours.
@@ -42,6 +44,7 @@ impl TriangleMesh {
             center,
             triangles,
             normals,
+            is_flat,
             uvs,
             colors,
             color_of,
@@ -59,7 +62,7 @@ impl TriangleMesh {
         // Lengths, because two meshes may divide the same numbers differently among the lists.
         let lengths = [positions.len(), triangles.len(), colors.len()];
         lengths.iter().for_each(|n| update(&(*n as u64).to_le_bytes()));
-        update(&[u8::from(normals.is_some()), u8::from(uvs.is_some())]);
+        update(&[u8::from(normals.is_some()), u8::from(uvs.is_some()), u8::from(*is_flat)]);
     }
 
     /// Returns the memory of the mesh in bytes.

@@ -3,11 +3,11 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, polygon};
+use crate::asset::mesh::{CREASE_ANGLE, MAX_TRIANGLES, MAX_VERTICES, polygon};
 use glam::DVec3;
 use std::collections::HashMap;
 use zerkalo_kernel::primitive::TriangleMesh;
-use zerkalo_kernel::primitive::mesh::smooth;
+use zerkalo_kernel::primitive::mesh::creased;
 
 /// Largest absolute value of a mesh coordinate.
 pub const MAX_COORDINATE: f64 = 1e9;
@@ -29,6 +29,8 @@ pub struct Builder<'a> {
     /// Normals of the vertices, in order. The list may be shorter than `positions`. The zero vector
     /// means that the file has no normal for the vertex.
     normals: Vec<[f32; 3]>,
+    /// `true` if triangles without normals are flat by the rules of the format.
+    pub is_flat: bool,
     /// Texture coordinates of the vertices, in order. The list may be shorter than `positions`; the
     /// other vertices have no texture coordinates.
     uvs: Vec<[f32; 2]>,
@@ -55,6 +57,7 @@ impl<'a> Builder<'a> {
             source,
             positions: Vec::new(),
             normals: Vec::new(),
+            is_flat: false,
             uvs: Vec::new(),
             with_uvs: HashMap::new(),
             triangles: Vec::new(),
@@ -225,7 +228,7 @@ impl<'a> Builder<'a> {
         }
         self.coordinates()?;
         let center = self.center().to_array();
-        let positions: Vec<[f32; 3]> = self
+        let mut positions: Vec<[f32; 3]> = self
             .positions
             .drain(..)
             .map(|p| std::array::from_fn(|i| (p[i] - center[i]) as f32))
@@ -239,7 +242,7 @@ impl<'a> Builder<'a> {
             let found = format!("the mesh is {extent:e} large");
             return Err(source.fault(found, "a size from 1e-9 to 1e9"));
         }
-        let normals = self.unit_normals(&positions);
+        let normals = self.unit_normals(&mut positions);
         let uvs = self.checked_uvs(positions.len());
         self.triangles.shrink_to_fit();
         let color_of = if self.colors.len() > 1 { self.color_of } else { Vec::new() };
@@ -248,6 +251,7 @@ impl<'a> Builder<'a> {
             center,
             triangles: self.triangles,
             normals,
+            is_flat: self.is_flat,
             uvs,
             colors: self.colors,
             color_of,
@@ -301,36 +305,46 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Returns a unit normal for each vertex. If some vertices have no normal in the file, their
-    /// normals are computed from the triangles. Returns `None` if no vertex has a normal in the
-    /// file.
-    fn unit_normals(&mut self, positions: &[[f32; 3]]) -> Option<Vec<[f32; 3]>> {
+    /// Returns a unit normal for each vertex; `None` if no vertex has a normal in the file. Triangles
+    /// at vertices without one get new vertices there, with computed normals.
+    fn unit_normals(&mut self, positions: &mut Vec<[f32; 3]>) -> Option<Vec<[f32; 3]>> {
+        const MISSING: [f32; 3] = [0.0; 3];
         let mut normals = std::mem::take(&mut self.normals);
-        if normals.is_empty() {
-            return None;
-        }
-        normals.resize(positions.len(), [0.0; 3]);
-        let mut without = 0;
+        normals.resize(positions.len(), MISSING);
         for n in &mut normals {
-            let d = n.map(f64::from);
-            let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-            if length.is_finite() && length > 0.0 {
-                *n = d.map(|x| (x / length) as f32);
-            } else {
-                *n = [0.0; 3];
-                without += 1;
-            }
+            let normal = DVec3::from(n.map(f64::from));
+            let unit = normal / normal.length();
+            *n = if unit.is_finite() { unit.as_vec3().to_array() } else { MISSING };
         }
-        if without == normals.len() {
+        if normals.iter().all(|n| *n == MISSING) {
             return None;
         }
-        if without > 0 {
-            let computed = smooth(positions, &self.triangles);
-            for (n, c) in normals.iter_mut().zip(computed).filter(|(n, _)| **n == [0.0; 3]) {
-                *n = c;
+        if self.triangles.as_flattened().iter().any(|i| normals[*i as usize] == MISSING) {
+            let degrees = if self.is_flat { 0.0 } else { CREASE_ANGLE };
+            let computed = creased(positions, &self.triangles, degrees);
+            let corners = computed.corners.as_flattened();
+            let mut copies = HashMap::new();
+            for (vertex, corner) in self.triangles.as_flattened_mut().iter_mut().zip(corners) {
+                let i = *vertex as usize;
+                if normals[i] != MISSING {
+                    continue;
+                }
+                *vertex = *copies.entry((i, *corner)).or_insert_with(|| {
+                    if let Some(uv) = self.uvs.get(i).copied() {
+                        self.uvs.resize(positions.len(), [0.0; 2]);
+                        self.uvs.push(uv);
+                    }
+                    positions.push(positions[i]);
+                    normals.push(computed.normals[*corner as usize]);
+                    (positions.len() - 1) as u32
+                });
             }
-            self.notes.push(("a vertex without a normal got a computed one".to_string(), without));
+            if !self.is_flat {
+                self.notes
+                    .push(("a normal that is missing was computed".to_string(), copies.len()));
+            }
         }
+        normals.iter_mut().filter(|n| **n == MISSING).for_each(|n| *n = [0.0, 0.0, 1.0]);
         Some(normals)
     }
 

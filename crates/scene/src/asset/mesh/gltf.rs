@@ -59,6 +59,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let gltf = Gltf::new(source)?;
     let mut builder = Builder::new(source);
+    builder.is_flat = true;
     gltf.check_extensions(&mut builder)?;
     let (order, scene_from_node) = gltf.transforms()?;
     for index in order {
@@ -947,6 +948,25 @@ mod tests {
             file["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
         };
         assert_eq!(bounds(&instanced), [[0.0, 7.0, 0.0], [1.0, 8.0, 5.0]]);
+    }
+
+    #[test]
+    fn gltf_parts_without_normals_are_flat() {
+        let (mut parts, file) = square();
+        assert!(read(&file).is_flat && read(&file).normals.is_none());
+        // Two triangles that share a side, bent there, and a part with normals.
+        let bent = parts.accessor(5126, &[SQUARE[0], SQUARE[1], SQUARE[2], &[0.0, 1.0, 1.0]]);
+        let normals = parts.accessor(5126, &[&[1.0, 0.0, 0.0] as &[f64]; 4]);
+        let mut file = parts.file(json!({"POSITION": bent, "TEXCOORD_1": 99}));
+        let with_normals = json!({"attributes": {"POSITION": 0, "NORMAL": normals}, "mode": 6});
+        file["meshes"][0]["primitives"].as_array_mut().unwrap().push(with_normals);
+        let mesh = read(&file);
+        assert_eq!(mesh.notes, [] as [String; 0]);
+        let found = mesh.normals.as_ref().unwrap();
+        let of = |t: usize| mesh.triangles[t].map(|i| found[i as usize]);
+        assert_eq!(of(0), [[0.0, 0.0, 1.0]; 3]);
+        assert!(of(1).iter().all(|n| *n == of(1)[0] && n[2] < 0.8), "{:?}", of(1));
+        assert_eq!([of(2), of(3)], [[[1.0, 0.0, 0.0]; 3]; 2]);
     }
 
     #[test]

@@ -19,6 +19,9 @@ pub const MAX_TRIANGLES: usize = 1 << 26;
 /// Largest number of vertices of a mesh: 128 Mi.
 pub const MAX_VERTICES: usize = 1 << 27;
 
+/// Crease angle of meshes without normals, except of formats in which these are flat \[degrees\].
+pub(crate) const CREASE_ANGLE: f64 = 40.0;
+
 /// Returns the estimated peak memory during parsing, in bytes per byte of the mesh file at
 /// `path`. OBJ needs more than other formats, because its positions are read as doubles into
 /// vectors that grow. Separate buffer files of glTF are not included.
@@ -27,7 +30,7 @@ pub(super) fn parse_bytes(path: &Path) -> u64 {
 }
 
 /// Parses a mesh file in memory. The format is determined by the extension of the file name.
-pub(super) fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
+pub(crate) fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("");
     match extension.to_ascii_lowercase().as_str() {
         "obj" => obj::parse(source),
