@@ -1,7 +1,7 @@
-//! Radiance HDR files: lines of text, then rows of pixels that consist of three mantissas and a
-//! common exponent (RGBE).
+//! Radiance HDR files: lines of text, then lines of pixels that consist of three mantissas and a
+//! common exponent (RGBE). A line is a row or a column of the image.
 //!
-//! A row has one of two encodings. In the newer one, the four components follow one another, each
+//! A line has one of two encodings. In the newer one, the four components follow one another, each
 //! as a sequence of runs. In the older one, a pixel (1, 1, 1, n) repeats the pixel before it n
 //! times; in a sequence of such pixels, the n are the digits of the count to base 256, lowest
 //! first. Source: G. Ward, "Real Pixels", Graphics Gems II, and the file `color.c` of Radiance.
@@ -14,89 +14,129 @@ use std::borrow::Cow;
 pub struct HdrFile<'a> {
     /// Width and height of the image in pixels.
     pub size: [u32; 2],
-    /// Product of the exposures in the header, above 0. A radiance is the value of a pixel divided
-    /// by the exposure.
-    exposure: f32,
-    /// Encoded rows of pixels.
-    rows: &'a [u8],
+    order: PixelOrder,
+    /// Products, in red, green and blue, of the exposures and colour corrections in the header, above
+    /// 0. A radiance is the value of a pixel divided by them.
+    factors: [f32; 3],
+    /// Encoded lines of pixels.
+    lines: &'a [u8],
+}
+
+/// Order of the pixels in a file.
+#[derive(Clone, Copy)]
+struct PixelOrder {
+    /// `true` if the lines are columns of the image.
+    by_columns: bool,
+    from_bottom: bool,
+    from_right: bool,
 }
 
 impl<'a> HdrFile<'a> {
-    /// Reads the header of a file whose first line begins with `#?RADIANCE`.
+    /// Reads the header of a file whose first line begins with `#?`.
     pub fn parse(source: &'a FileContents) -> Result<Self, AssetError> {
         let mut lines = Lines { rest: &source.bytes, number: 0 };
         let end =
             || source.fault("the header cannot be read: the file ends in it", "a whole image");
         lines.next().ok_or_else(end)?;
-        let mut exposure = 1.0;
+        let mut factors = [1.0; 3];
         loop {
             let line = lines.next().ok_or_else(end)?;
             if line.is_empty() {
                 break;
             }
-            let error = |found: String, expected: &str| {
+            let line_factors = line_factors(&line).map_err(|(found, expected)| {
                 source.error(FileLocation::Line(lines.number), found, expected)
-            };
-            let (key, value) = line.split_once('=').unwrap_or_default();
-            match (key.trim(), value.trim()) {
-                // Comments, other lines without a value.
-                (_, "") => {}
-                (comment, _) if comment.starts_with('#') => {}
-                ("FORMAT", RGBE) => {}
-                ("FORMAT", other) => {
-                    let found = format!("the pixels have the format `{}`", shortened(other));
-                    return Err(error(found, &format!("the format `{RGBE}`")));
-                }
-                ("EXPOSURE", number) => {
-                    let found = || format!("`{}` is no number", shortened(number));
-                    let factor = number.parse::<f32>();
-                    exposure *= factor.map_err(|_| error(found(), "an exposure above 0"))?;
-                }
-                _ => {}
-            }
+            })?;
+            factors.iter_mut().zip(line_factors).for_each(|(product, factor)| *product *= factor);
         }
-        if !(exposure.is_finite() && exposure > 0.0) {
-            let found = format!("the exposure of the image is {exposure}");
+        let is_valid = |factor: &f32| factor.is_finite() && *factor > 0.0;
+        if let Some(factor) = factors.iter().find(|factor| !is_valid(factor)) {
+            let found = format!("the exposure of the image is {factor}");
             return Err(source.fault(found, "an exposure above 0"));
         }
         let line = lines.next().ok_or_else(end)?;
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let size = match words[..] {
-            ["-Y", height, "+X", width] => width.parse().ok().zip(height.parse().ok()),
-            _ => None,
-        };
-        let Some((width, height)) = size else {
+        let Some((size, order)) = parse_size(&line) else {
             let found = format!("the size `{}` cannot be read", shortened(&line));
-            let expected = "`-Y HEIGHT +X WIDTH`, for rows from the top, from left to right";
+            let expected = "`-Y HEIGHT +X WIDTH`, with any signs and in any order";
             return Err(source.error(FileLocation::Line(lines.number), found, expected));
         };
-        Ok(Self { size: [width, height], exposure, rows: lines.rest })
+        Ok(Self { size, order, factors, lines: lines.rest })
     }
 
     /// Decodes the pixels (red, green, blue) of the file `source`, row by row from the top. The
     /// image must have pixels.
     pub fn pixels(&self, source: &FileContents) -> Result<Vec<[f32; 3]>, AssetError> {
         let [width, height] = self.size.map(|n| n as usize);
-        let (scales, factor) = (scales(), 1.0 / self.exposure);
-        let mut rest = self.rows;
-        let mut row = vec![[0; 4]; width];
-        let mut pixels = Vec::with_capacity(width * height);
-        for y in 0..height {
-            decode_row(&mut rest, &mut row).map_err(|fault| {
+        let PixelOrder { by_columns, from_bottom, from_right } = self.order;
+        let (count, length) = if by_columns { (width, height) } else { (height, width) };
+        let factors = self.factors.map(|factor| 1.0 / factor);
+        let (scales, mut rest) = (scales(), self.lines);
+        let mut line = vec![[0; 4]; length];
+        let mut pixels = vec![[0.0; 3]; width * height];
+        for number in 0..count {
+            decode_line(&mut rest, &mut line).map_err(|fault| {
                 let found = format!("the Radiance image cannot be read: {fault}");
-                source.error(FileLocation::Part(format!("row {y}")), found, "a whole image")
+                let kind = if by_columns { "column" } else { "row" };
+                let place = FileLocation::Part(format!("{kind} {number}"));
+                source.error(place, found, "a whole image")
             })?;
-            pixels.extend(row.iter().map(|[r, g, b, exponent]| {
+            for (i, [mantissas @ .., exponent]) in line.iter().enumerate() {
+                let (x, y) = if by_columns { (number, i) } else { (i, number) };
+                let x = if from_right { width - 1 - x } else { x };
+                let y = if from_bottom { height - 1 - y } else { y };
                 let scale = scales[usize::from(*exponent)];
-                [r, g, b].map(|mantissa| scale * f32::from(*mantissa) * factor)
-            }));
+                pixels[y * width + x] =
+                    std::array::from_fn(|c| scale * f32::from(mantissas[c]) * factors[c]);
+            }
         }
         Ok(pixels)
     }
 }
 
+/// Returns the factors in red, green and blue by which radiances were multiplied, as a line of the
+/// header states them. Fails with what was found and what was expected.
+fn line_factors(line: &str) -> Result<[f32; 3], (String, &'static str)> {
+    let (key, value) = line.split_once('=').unwrap_or_default();
+    let (key, value) = (key.trim(), value.trim());
+    let numbers: Result<Vec<f32>, _> = value.split_whitespace().map(str::parse).collect();
+    match (key, numbers.as_deref()) {
+        ("FORMAT", _) if ![RGBE, ""].contains(&value) => {
+            let found = format!("the pixels have the format `{}`", shortened(value));
+            Err((found, "the format `32-bit_rle_rgbe`"))
+        }
+        ("EXPOSURE", Ok([exposure, ..])) => Ok([*exposure; 3]),
+        ("COLORCORR", Ok(&[r, g, b, ..])) => Ok([r, g, b]),
+        ("EXPOSURE" | "COLORCORR", _) if !value.is_empty() => {
+            let found = format!("the {key} `{}` cannot be read", shortened(value));
+            Err((found, "1 number for EXPOSURE, 3 for COLORCORR"))
+        }
+        // Comments, lines without a value, keys of other programs.
+        _ => Ok([1.0; 3]),
+    }
+}
+
+/// Reads the line that states size and order of the pixels, such as `-Y 512 +X 1024` for rows from
+/// the top, from left to right. The first axis is that from line to line.
+fn parse_size(line: &str) -> Option<([u32; 2], PixelOrder)> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let [first, count, second, length] = words[..] else { return None };
+    let (count, length) = (count.parse().ok()?, length.parse().ok()?);
+    let by_columns = first.ends_with('X');
+    let (x, y) = if by_columns { (first, second) } else { (second, first) };
+    let is_second = |axis: &str, directions: [&str; 2]| {
+        directions.iter().position(|direction| *direction == axis).map(|i| i == 1)
+    };
+    let from_right = is_second(x, ["+X", "-X"])?;
+    let from_bottom = is_second(y, ["-Y", "+Y"])?;
+    let size = if by_columns { [count, length] } else { [length, count] };
+    Some((size, PixelOrder { by_columns, from_bottom, from_right }))
+}
+
 /// Value of the header line `FORMAT` for pixels of red, green, blue and exponent.
 const RGBE: &str = "32-bit_rle_rgbe";
+
+/// Largest number of bytes of a header's line that are read.
+const MAX_LINE: usize = 4096;
 
 /// Lines of a header.
 struct Lines<'a> {
@@ -107,7 +147,7 @@ struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// Returns the next line. Returns `None` at the end of the file.
+    /// Returns the next line, which ends with LF or CR LF. Returns `None` at the end of the file.
     fn next(&mut self) -> Option<Cow<'a, str>> {
         if self.rest.is_empty() {
             return None;
@@ -116,7 +156,8 @@ impl<'a> Lines<'a> {
         let (line, rest) = self.rest.split_at(end.unwrap_or(self.rest.len()));
         self.rest = rest.get(1..).unwrap_or_default();
         self.number += 1;
-        Some(String::from_utf8_lossy(line))
+        let line = line.strip_suffix(b"\r").unwrap_or(line);
+        Some(String::from_utf8_lossy(&line[..line.len().min(MAX_LINE)]))
     }
 }
 
@@ -127,16 +168,14 @@ fn shortened(text: &str) -> String {
 
 /// Returns the values of mantissa 1 for all exponents: 2^(exponent - 136), but 0 for the exponent 0.
 fn scales() -> [f32; 256] {
-    let mut scales = [0.0; 256];
-    scales[1] = f32::exp2(-120.0) * f32::exp2(-15.0);
-    for exponent in 2..256 {
-        scales[exponent] = 2.0 * scales[exponent - 1];
-    }
-    scales
+    std::array::from_fn(|e| if e == 0 { 0.0 } else { f64::exp2(e as f64 - 136.0) as f32 })
 }
 
+/// Lengths of the lines that may have the newer encoding. Others have the older one.
+const NEWER_LENGTHS: std::ops::Range<usize> = 8..1 << 15;
+
 const TOO_SHORT: &str = "the file ends";
-const TOO_LONG: &str = "a run is longer than the row";
+const TOO_LONG: &str = "a run is longer than the line";
 
 /// Removes the first `N` bytes from `bytes` and returns them.
 fn take<const N: usize>(bytes: &mut &[u8]) -> Result<[u8; N], &'static str> {
@@ -145,13 +184,18 @@ fn take<const N: usize>(bytes: &mut &[u8]) -> Result<[u8; N], &'static str> {
     Ok(*taken)
 }
 
-/// Decodes a row of at least one pixel, and removes it from `bytes`.
-fn decode_row(bytes: &mut &[u8], row: &mut [[u8; 4]]) -> Result<(), &'static str> {
+/// Decodes a line of at least one pixel, and removes it from `bytes`.
+fn decode_line(bytes: &mut &[u8], line: &mut [[u8; 4]]) -> Result<(), &'static str> {
     let first = take(bytes)?;
     match first {
-        [2, 2, 0..128, _] => (0..4).try_for_each(|c| decode_component(bytes, row, c)),
+        [2, 2, high @ 0..128, low] if NEWER_LENGTHS.contains(&line.len()) => {
+            if usize::from(u16::from_be_bytes([high, low])) != line.len() {
+                return Err("it has another length than the image");
+            }
+            (0..4).try_for_each(|c| decode_component(bytes, line, c))
+        }
         [1, 1, 1, _] => Err("its first pixel repeats another one"),
-        _ => decode_pixels(bytes, row, first),
+        _ => decode_pixels(bytes, line, first),
     }
 }
 
@@ -226,26 +270,26 @@ mod tests {
     /// Returns the row of `width` pixels that `bytes` encode, or the error.
     fn row(width: usize, mut bytes: &[u8]) -> Result<Vec<[u8; 4]>, &'static str> {
         let mut row = vec![[0; 4]; width];
-        decode_row(&mut bytes, &mut row)?;
+        decode_line(&mut bytes, &mut row)?;
         assert!(bytes.is_empty(), "{} bytes are left", bytes.len());
         Ok(row)
     }
 
     #[test]
     fn pixels_have_a_common_exponent() {
-        for (exponent, scale) in scales().into_iter().enumerate().skip(1) {
-            assert_eq!(f64::from(scale), f64::exp2(exponent as f64 - 136.0));
-        }
         let source = file("", "-Y 2 +X 1", &[128, 1, 255, 136, 128, 1, 255, 0]);
         assert_eq!(pixels(&source).unwrap(), [[128.0, 1.0, 255.0], [0.0; 3]]);
     }
 
     #[test]
     fn runs_are_repeated() {
-        // Newer encoding: runs of 3 and 1 for red, single values for green and blue, a run of 4.
-        let runs = [2, 2, 0, 4, 131, 9, 1, 8, 4, 1, 2, 3, 4, 2, 5, 6, 2, 7, 0, 132, 1];
-        let expected = [[9, 1, 5, 1], [9, 2, 6, 1], [9, 3, 7, 1], [8, 4, 0, 1]];
-        assert_eq!(row(4, &runs).unwrap(), expected);
+        // Newer encoding: runs of 3 and 5 for red, single values for green, runs of 4 for blue, a run
+        // of 8.
+        let runs = [2, 2, 0, 8, 131, 9, 133, 8, 8, 1, 2, 3, 4, 5, 6, 7, 8, 132, 5, 132, 6, 136, 1];
+        let expected: [[u8; 4]; 8] = std::array::from_fn(|i| {
+            [if i < 3 { 9 } else { 8 }, i as u8 + 1, if i < 4 { 5 } else { 6 }, 1]
+        });
+        assert_eq!(row(8, &runs).unwrap(), expected);
         // Older encoding: the second pixel is repeated 1 + 2 * 256 times, the third one twice.
         let pixels = [[9, 8, 7, 6], [5; 4], [1, 1, 1, 1], [1, 1, 1, 2], [4; 4], [1, 1, 1, 2]];
         let decoded = row(1 + 514 + 3, pixels.as_flattened()).unwrap();
@@ -253,13 +297,14 @@ mod tests {
         assert!(decoded[1..515].iter().all(|pixel| *pixel == [5; 4]));
         assert!(decoded[515..].iter().all(|pixel| *pixel == [4; 4]));
         for (bytes, fault) in [
-            (&runs[..20], TOO_SHORT),
-            (&[2, 2, 0, 4, 5, 1, 1, 1, 1, 1], TOO_LONG),
-            (&[2, 2, 0, 4, 133, 1], TOO_LONG),
-            (&[9, 9, 9, 9, 1, 1, 1, 4], TOO_LONG),
+            (&runs[..22], TOO_SHORT),
+            (&[2, 2, 0, 8, 9, 1, 1, 1, 1, 1], TOO_LONG),
+            (&[2, 2, 0, 8, 137, 1], TOO_LONG),
+            (&[2, 2, 0, 9, 136, 1], "it has another length than the image"),
+            (&[9, 9, 9, 9, 1, 1, 1, 8], TOO_LONG),
             (&[1, 1, 1, 1], "its first pixel repeats another one"),
         ] {
-            assert_eq!(row(4, bytes), Err(fault), "{bytes:?}");
+            assert_eq!(row(8, bytes), Err(fault), "{bytes:?}");
         }
         // The digits of a count exceed all numbers.
         let digits = [&[9; 4][..], &[1, 1, 1, 0].repeat(9), &[1, 1, 1, 1]].concat();
@@ -267,21 +312,68 @@ mod tests {
     }
 
     #[test]
-    fn exposures_are_divided_out() {
+    fn lines_of_other_lengths_have_the_older_encoding() {
+        for width in [1, 2, 7, 1 << 15] {
+            let pixels = vec![[2, 2, 0, 9]; width];
+            assert_eq!(row(width, pixels.as_flattened()), Ok(pixels));
+        }
+    }
+
+    /// Checks the eight orders of an image of 9 x 8 pixels. The pixel in column x and row y has the
+    /// colour x, y, 2. Each order is tested in both encodings and with both line endings.
+    #[test]
+    fn images_of_all_orders_are_upright() {
+        let expected: Vec<[f32; 3]> =
+            (0..8u8).flat_map(|y| (0..9u8).map(move |x| [x, y, 2].map(f32::from))).collect();
+        for size in [
+            "-Y 8 +X 9",
+            "-Y 8 -X 9",
+            "+Y 8 +X 9",
+            "+Y 8 -X 9",
+            "+X 9 -Y 8",
+            "-X 9 -Y 8",
+            "+X 9 +Y 8",
+            "-X 9 +Y 8",
+        ] {
+            // The columns and rows in the order of the file.
+            let columns = (0..9u8).map(|x| if size.contains("+X") { x } else { 8 - x });
+            let rows = (0..8u8).map(|y| if size.contains("-Y") { y } else { 7 - y });
+            let pixel = |x: u8, y: u8| [x, y, 2, 136];
+            let lines: Vec<Vec<[u8; 4]>> = if size.starts_with(['-', '+']) && &size[1..2] == "Y" {
+                rows.map(|y| columns.clone().map(|x| pixel(x, y)).collect()).collect()
+            } else {
+                columns.map(|x| rows.clone().map(|y| pixel(x, y)).collect()).collect()
+            };
+            let flat = lines.concat().as_flattened().to_vec();
+            let runs: Vec<u8> = lines.iter().flat_map(|line| encoded(line, &[3, 128])).collect();
+            for (bytes, end) in [(&flat, "\n"), (&runs, "\n"), (&flat, "\r\n"), (&runs, "\r\n")] {
+                let text = format!("#?RGBE\nFORMAT=32-bit_rle_rgbe\n\n{size}\n").replace('\n', end);
+                let bytes = [text.as_bytes(), bytes].concat();
+                let source = FileContents { path: PathBuf::from("a.hdr"), bytes };
+                assert_eq!(pixels(&source).unwrap(), expected, "{text:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn exposures_and_colour_corrections_are_divided_out() {
         let header = "# EXPOSURE=3\nEXPOSURE=4\npfilt -x 8\n EXPOSURE = 0.5\nGAMMA=2\nVIEW=\n\
-                      FORMAT=32-bit_rle_rgbe\n";
+                      FORMAT=32-bit_rle_rgbe\nCOLORCORR= 1 2 0.5\nCOLORCORR=2 2 2\n";
         let source = file(header, "-Y 1 +X 1", &[128, 64, 32, 136]);
-        assert_eq!(pixels(&source).unwrap(), [[64.0, 32.0, 16.0]]);
+        assert_eq!(pixels(&source).unwrap(), [[32.0, 8.0, 16.0]]);
     }
 
     #[test]
     fn header_errors_have_line_numbers() {
         for (header, size, message) in [
-            ("EXPOSURE=bright\n", "-Y 1 +X 1", "a.hdr:2: `bright` is no number"),
+            ("EXPOSURE=bright\n", "-Y 1 +X 1", "a.hdr:2: the EXPOSURE `bright` cannot be read"),
+            ("COLORCORR=1 2\n", "-Y 1 +X 1", "a.hdr:2: the COLORCORR `1 2` cannot be read"),
+            ("COLORCORR=1 0 1\n", "-Y 1 +X 1", "a.hdr: the exposure of the image is 0"),
             ("EXPOSURE=2\nEXPOSURE=-1\n", "-Y 1 +X 1", "a.hdr: the exposure of the image is -2"),
             ("EXPOSURE=1e39\n", "-Y 1 +X 1", "a.hdr: the exposure of the image is inf"),
             ("\0=1\nFORMAT=32-bit_rle_xyze\n", "-Y 1 +X 1", "a.hdr:3: the pixels have the format"),
-            ("", "+Y 1 +X 1", "a.hdr:3: the size `+Y 1 +X 1` cannot be read"),
+            ("", "+Y 1 +Y 1", "a.hdr:3: the size `+Y 1 +Y 1` cannot be read"),
+            ("", "Y 1 X 1", "a.hdr:3: the size `Y 1 X 1` cannot be read"),
             ("", "-Y 1 +X 4294967296", "a.hdr:3: the size"),
             ("", "-Y 1 +X 1 1", "a.hdr:3: the size"),
             ("", "", "a.hdr:3: the size `` cannot be read"),
@@ -321,7 +413,7 @@ mod tests {
     proptest! {
         #[test]
         fn runs_are_inverse_to_encoding(
-            pixels in prop::collection::vec([0..3u8, 0..3u8, 0..3u8, 0..3u8], 1..400),
+            pixels in prop::collection::vec([0..3u8, 0..3u8, 0..3u8, 0..3u8], 8..400),
             lengths in prop::collection::vec(1..=128usize, 1..9),
         ) {
             prop_assert_eq!(row(pixels.len(), &encoded(&pixels, &lengths)), Ok(pixels));
@@ -336,7 +428,7 @@ mod tests {
             let bytes = [start, &bytes].concat();
             let mut rest = &bytes[..];
             let mut row = vec![[0; 4]; width];
-            while decode_row(&mut rest, &mut row).is_ok() {}
+            while decode_line(&mut rest, &mut row).is_ok() {}
             prop_assert!(rest.len() <= bytes.len());
         }
     }

@@ -42,7 +42,7 @@ impl ImageFormat {
         let formats: [(&[u8], Self); 4] = [
             (b"\x89PNG\r\n\x1a\n", Self::Png),
             (b"\xff\xd8\xff", Self::Jpeg),
-            (b"#?RADIANCE", Self::Hdr),
+            (b"#?", Self::Hdr),
             (b"\x76\x2f\x31\x01", Self::OpenExr),
         ];
         formats.into_iter().find_map(|(start, format)| bytes.starts_with(start).then_some(format))
