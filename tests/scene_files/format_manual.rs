@@ -113,8 +113,12 @@ and every key with a default may be left out. Unknown keys are errors.
 - An environment light is infinitely far away in all directions. It adds to the background, lights diffuse
   surfaces, makes highlights, and is seen by the camera and in mirrors unless `visible = false`. Its image
   is equirectangular: the top row is up (+y), the middle is towards -z, a quarter to the right of the middle
-  is +x. Values of Radiance and OpenEXR files are radiances (negative values are
-  replaced by 0); values of PNG and JPEG files are sRGB levels. An image has at most 33554432 pixels.
+  is +x. Values of Radiance and OpenEXR files are radiances; values of PNG and JPEG files are sRGB levels. Negative
+  values and NaN are replaced by 0, infinite ones by the largest finite value of the image, at least 65504; a note
+  counts NaN and infinite pixels. An image has at most 33554432 pixels.
+- A Radiance image may have any of the eight orders of pixels; `EXPOSURE` and `COLORCORR` are divided out. Of an
+  OpenEXR file, the first layer with the channels R, G and B is shown, otherwise the only channels with such names
+  after a prefix (or those named `Combined`), otherwise Y as grey. Primaries other than those of sRGB are converted.
 - A spot light has its full intensity inside the cone of `inner_angle` about its axis and none outside the
   cone of `outer_angle`. Between them the factor is t^2 (3 - 2t), where t rises linearly with the cosine of
   the angle from 0 at the outer to 1 at the inner cone. Equal angles make a sharp edge.

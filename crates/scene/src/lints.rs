@@ -8,7 +8,6 @@ use crate::material::{Fresnel, Highlight, Material};
 use crate::validate::Problem;
 use crate::value::{Color, number};
 use std::collections::HashSet;
-use std::sync::Arc;
 
 /// Path of a doubtful value, and a phrase such as `alpha has no effect here`.
 type Case = (Vec<String>, String);
@@ -88,21 +87,35 @@ impl Scene {
         problems
     }
 
-    /// Returns what the readers of mesh files left out or replaced: the path of a key that names
-    /// the file, and a phrase with the name of the file.
+    /// Returns what the readers of meshes and images left out or replaced: the path of a key that
+    /// names the file, and a phrase with the name of the file.
     pub fn file_notes(&self) -> Vec<(Vec<String>, String)> {
-        let mut known = HashSet::new();
-        let objects = self.objects.iter().enumerate().filter_map(|(i, object)| {
-            let mesh = object.shape.mesh()?;
-            let notes = known.insert(Arc::as_ptr(mesh)).then_some(&mesh.mesh.notes)?;
-            let path = ["object", &i.to_string(), "shape", "mesh", "file"].map(str::to_string);
-            Some((path.to_vec(), object.shape.file()?, notes))
-        });
-        let note = |(path, file, notes): (Vec<String>, &str, &Vec<String>)| {
-            let note = |note: &String| (path.clone(), format!("\"{file}\": {note}"));
-            notes.iter().map(note).collect::<Vec<_>>()
+        let (mut known, mut out) = (HashSet::new(), Vec::new());
+        let mut add = |path: &[&str], file: &str, notes: &[String]| {
+            for note in notes.iter().map(|note| format!("\"{file}\": {note}")) {
+                if known.insert(note.clone()) {
+                    out.push((path.iter().map(|key| key.to_string()).collect(), note));
+                }
+            }
         };
-        objects.flat_map(note).collect()
+        for (i, object) in self.objects.iter().enumerate() {
+            if let (Some(file), Some(mesh)) = (object.shape.file(), object.shape.mesh()) {
+                let path = ["object", &i.to_string(), "shape", "mesh", "file"];
+                add(&path, file, &mesh.mesh.notes);
+            }
+        }
+        for (i, environment) in self.lights.iter().map(Light::environment).enumerate() {
+            if let Some((file, map)) = environment.and_then(|sky| sky.file().zip(sky.map())) {
+                add(&["light", &i.to_string(), "environment", "file"], file, &map.notes);
+            }
+        }
+        for (name, material) in &self.materials {
+            for (key, file, image) in material.image_files() {
+                let notes = image.map_or(&[][..], |image| &image.notes);
+                add(&["materials", name, key, "image", "file"], file, notes);
+            }
+        }
+        out
     }
 }
 
@@ -137,6 +150,7 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
 mod tests {
     use crate::Document;
     use crate::asset::Assets;
+    use std::fs;
     use std::sync::Arc;
 
     #[test]
@@ -144,7 +158,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| {
             let path = folder.path().join(name);
-            std::fs::write(&path, text).unwrap();
+            fs::write(&path, text).unwrap();
             path
         };
         write("a.obj", "mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\nl 2 3\n");
@@ -157,5 +171,32 @@ mod tests {
         assert!(warnings[0].contains("s.toml:3:23") && warnings[0].contains("none.mtl"));
         let lines = "\"a.obj\": points and lines were left out (2 times)";
         assert!(warnings[1].contains(lines), "{warnings:?}");
+    }
+
+    #[test]
+    fn notes_of_image_readers_are_warnings_of_the_first_use() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, bytes: &[u8]| {
+            let path = folder.path().join(name);
+            fs::write(&path, bytes).unwrap();
+            path
+        };
+        // The largest exponent with the largest mantissas is above 1e15.
+        write("sky.hdr", b"#?RGBE\n\n-Y 1 +X 2\n\xff\xff\xff\xff\x80\x80\x80\x80");
+        let jpeg = include_bytes!("../../../tests/images/grey.jpg");
+        write("cut.jpg", &[&jpeg[..jpeg.len() - 60], &[0; 4000]].concat());
+        let text = "[[light]]\nenvironment.file = \"sky.hdr\"\n\
+                    [materials.a]\ntexture.image.file = \"cut.jpg\"\n\
+                    [materials.b]\nbump.image.file = \"cut.jpg\"\n\
+                    [[object]]\nmaterial = \"a\"\nshape.cube = { corner = [0, 0, 0], edge = 1 }\n";
+        let path = write("s.toml", text.as_bytes());
+        let document = Document::read(&path, Default::default()).unwrap();
+        let warnings: Vec<_> = document.warnings.iter().map(ToString::to_string).collect();
+        assert_eq!(warnings.len(), 2, "{warnings:?}");
+        let sky =
+            "\"sky.hdr\": pixels that are infinite or above 1e15, taken as 65504: 1, the first";
+        assert!(warnings[0].contains("s.toml:2:20") && warnings[0].contains(sky), "{warnings:?}");
+        let cut = "\"cut.jpg\": the file has no end";
+        assert!(warnings[1].contains("s.toml:4:22") && warnings[1].contains(cut), "{warnings:?}");
     }
 }

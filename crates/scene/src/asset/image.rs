@@ -5,7 +5,7 @@ use crate::asset::file::FileContents;
 use crate::value::{Fnv1a64, linear_from_srgb};
 use image::codecs::png::PngDecoder;
 use image::metadata::Orientation;
-use image::{DynamicImage, GrayImage, ImageDecoder, ImageError, Limits, RgbImage};
+use image::{ColorType, DynamicImage, GrayImage, ImageDecoder, ImageError, Limits, RgbImage};
 use std::error::Error;
 use std::fmt::Display;
 use std::io::Cursor;
@@ -63,6 +63,8 @@ pub struct Image {
     size: [u32; 2],
     channels: usize,
     texels: Texels,
+    /// Notes for the user about damage of the file: sentences without a period.
+    pub notes: Vec<String>,
 }
 
 /// Returns the linear light, 0..=1, of the sRGB levels from 0 to `last` (white).
@@ -109,7 +111,8 @@ impl Image {
             (true, false) => Texels::Bytes(image.into_rgb8().into_raw()),
             (true, true) => Texels::Words(image.into_rgb16().into_raw()),
         };
-        Self { size, channels: if color.has_color() { 3 } else { 1 }, texels }
+        let channels = if color.has_color() { 3 } else { 1 };
+        Self { size, channels, texels, notes: Vec::new() }
     }
 
     /// Returns width and height in pixels, each at least 1.
@@ -189,49 +192,82 @@ fn decode_error(source: &FileContents, format: &str, error: impl Display) -> Ass
     source.fault(format!("the {format} image cannot be read: {error}"), EXPECTED)
 }
 
-/// Decodes a PNG file.
-fn decode_png(source: &FileContents) -> Result<Image, AssetError> {
+/// Reads the header of a PNG file, and checks its size.
+fn png_decoder(source: &FileContents) -> Result<PngDecoder<Cursor<&[u8]>>, AssetError> {
+    // This is the limit of everything but the pixels, such as an inflated colour profile.
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(1 << 26);
+    let decoder = PngDecoder::with_limits(Cursor::new(&source.bytes[..]), limits);
+    let decoder = decoder.map_err(|error| png_error(source, &error))?;
+    check_size(source, decoder.dimensions().into(), MAX_SIDE, MAX_PIXELS)?;
+    Ok(decoder)
+}
+
+fn png_error(source: &FileContents, error: &ImageError) -> AssetError {
     // `image` puts the words "Format error decoding Png" before the cause of an error.
-    let error = |error: ImageError| match (&error, error.source()) {
+    match (error, error.source()) {
         (ImageError::Limits(_), _) => {
             source.fault("the PNG image is too large", &size_limits(MAX_SIDE, MAX_PIXELS))
         }
         (_, Some(cause)) => decode_error(source, "PNG", cause),
-        (_, None) => decode_error(source, "PNG", &error),
-    };
-    let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(MAX_PIXELS * 8);
-    let mut decoder =
-        PngDecoder::with_limits(Cursor::new(&source.bytes[..]), limits).map_err(error)?;
-    check_size(source, decoder.dimensions().into(), MAX_SIDE, MAX_PIXELS)?;
-    let exif = decoder.exif_metadata().map_err(error)?;
-    let image = DynamicImage::from_decoder(decoder).map_err(error)?;
+        (_, None) => decode_error(source, "PNG", error),
+    }
+}
+
+/// Decodes a PNG file.
+fn decode_png(source: &FileContents) -> Result<Image, AssetError> {
+    let mut decoder = png_decoder(source)?;
+    let exif = decoder.exif_metadata();
+    let exif = exif.map_err(|error| png_error(source, &error))?;
+    let image = DynamicImage::from_decoder(decoder).map_err(|error| png_error(source, &error))?;
     Ok(Image::upright(image, exif.as_deref()))
 }
 
-/// Decodes a JPEG file to RGB, or to grey if the file is grey.
-fn decode_jpeg(source: &FileContents) -> Result<Image, AssetError> {
-    let error = |e| decode_error(source, "JPEG", e);
+/// JPEG file whose header has been read.
+struct JpegHeader<'a> {
+    decoder: JpegDecoder<ZCursor<&'a [u8]>>,
+    size: [u32; 2],
+    /// Type of the decoded image: RGB, or grey if the file is grey.
+    color: ColorType,
+}
+
+/// Reads the header of a JPEG file, and checks its size.
+fn jpeg_header(source: &FileContents) -> Result<JpegHeader<'_>, AssetError> {
     let options = DecoderOptions::default()
         .set_strict_mode(true)
         .set_max_width(usize::MAX)
         .set_max_height(usize::MAX);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&source.bytes[..]), options);
-    decoder.decode_headers().map_err(error)?;
+    decoder.decode_headers().map_err(|error| decode_error(source, "JPEG", error))?;
     // Sides in a JPEG file have 16 bits. After the headers are read, they are known.
     let (width, height) = decoder.dimensions().unwrap_or_default();
-    let [width, height] = [width as u32, height as u32];
-    check_size(source, [width, height], MAX_SIDE, MAX_PIXELS)?;
-    let is_grey = decoder.input_colorspace() == Some(ColorSpace::Luma);
-    let space = if is_grey { ColorSpace::Luma } else { ColorSpace::RGB };
+    let size = [width as u32, height as u32];
+    check_size(source, size, MAX_SIDE, MAX_PIXELS)?;
+    let (space, color) = match decoder.input_colorspace() == Some(ColorSpace::Luma) {
+        true => (ColorSpace::Luma, ColorType::L8),
+        false => (ColorSpace::RGB, ColorType::Rgb8),
+    };
     decoder.set_options(options.jpeg_set_out_colorspace(space));
-    let levels = decoder.decode().map_err(error)?;
-    let image = match is_grey {
-        true => GrayImage::from_raw(width, height, levels).map(DynamicImage::from),
-        false => RgbImage::from_raw(width, height, levels).map(DynamicImage::from),
+    Ok(JpegHeader { decoder, size, color })
+}
+
+/// Decodes a JPEG file.
+fn decode_jpeg(source: &FileContents) -> Result<Image, AssetError> {
+    let JpegHeader { mut decoder, size: [width, height], color } = jpeg_header(source)?;
+    let levels = decoder.decode().map_err(|error| decode_error(source, "JPEG", error))?;
+    let image = match color.has_color() {
+        false => GrayImage::from_raw(width, height, levels).map(DynamicImage::from),
+        true => RgbImage::from_raw(width, height, levels).map(DynamicImage::from),
     };
     let image = image.ok_or_else(|| decode_error(source, "JPEG", "pixels are missing"))?;
-    Ok(Image::upright(image, decoder.exif().map(Vec::as_slice)))
+    let mut image = Image::upright(image, decoder.exif().map(Vec::as_slice));
+    // The decoder takes bytes that are missing for zeros. Where a download was cut off, the end of
+    // the image is missing after the start of the last scan.
+    let last = |marker: [u8; 2]| source.bytes.windows(2).rposition(|pair| pair == marker);
+    if last([0xff, 0xd9]) < last([0xff, 0xda]) {
+        image.notes.push("the file has no end: the lower part of the image may be damaged".into());
+    }
+    Ok(image)
 }
 
 #[cfg(test)]
@@ -292,19 +328,51 @@ mod tests {
         assert_eq!(image.bytes(), 8);
     }
 
+    /// Checks all colour types and bit depths of PNG: the file's values, and those of the image.
     #[test]
-    fn few_bits_and_palettes_become_bytes() {
-        // The bits 1 0 1 in each of two rows.
-        let bits = |depth| parsed(info([3, 2], ColorType::Grayscale, depth), &[0b1010_0000; 2]);
-        assert_eq!(values(&bits(BitDepth::One)), [255, 0, 255, 255, 0, 255]);
-        assert_eq!(values(&bits(BitDepth::Two)), [170, 170, 0, 170, 170, 0]);
-        for transparency in [None, Some((&[0, 128]).into())] {
-            let mut info = info([3, 1], ColorType::Indexed, BitDepth::Four);
-            info.palette = Some(vec![9, 8, 7, 255, 0, 1].into());
-            info.trns = transparency;
-            let image = parsed(info, &[0x10, 0x10]);
-            assert_eq!((image.channels, image.bytes()), (3, 9));
-            assert_eq!(values(&image), [255, 0, 1, 9, 8, 7, 255, 0, 1]);
+    fn all_color_types_keep_their_depth() {
+        use ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
+        let deep: [u8; 16] = std::array::from_fn(|i| 16 * i as u8 + 1);
+        let words = |numbers: &[usize]| -> Vec<u16> {
+            numbers.iter().map(|i| u16::from_be_bytes([deep[2 * i], deep[2 * i + 1]])).collect()
+        };
+        let indexed = vec![255, 0, 1, 9, 8, 7];
+        for (color, depth, data, bytes, expected) in [
+            (Grayscale, BitDepth::One, &[0b1000_0000][..], 1, vec![255, 0]),
+            (Grayscale, BitDepth::Two, &[0b1001_0000], 1, vec![170, 85]),
+            (Grayscale, BitDepth::Four, &[0xa3], 1, vec![170, 51]),
+            (Grayscale, BitDepth::Eight, &[200, 7], 1, vec![200, 7]),
+            (Grayscale, BitDepth::Sixteen, &deep[..4], 2, words(&[0, 1])),
+            (GrayscaleAlpha, BitDepth::Eight, &[200, 0, 7, 9], 1, vec![200, 7]),
+            (GrayscaleAlpha, BitDepth::Sixteen, &deep[..8], 2, words(&[0, 2])),
+            (Indexed, BitDepth::One, &[0b1000_0000], 3, indexed.clone()),
+            (Indexed, BitDepth::Two, &[0b0100_0000], 3, indexed.clone()),
+            (Indexed, BitDepth::Four, &[0x10], 3, indexed.clone()),
+            (Indexed, BitDepth::Eight, &[1, 0], 3, indexed),
+            (Rgb, BitDepth::Eight, &[1, 2, 3, 4, 5, 6], 3, vec![1, 2, 3, 4, 5, 6]),
+            (Rgb, BitDepth::Sixteen, &deep[..12], 6, words(&[0, 1, 2, 3, 4, 5])),
+            (Rgba, BitDepth::Eight, &[1, 2, 3, 0, 4, 5, 6, 0], 3, vec![1, 2, 3, 4, 5, 6]),
+            (Rgba, BitDepth::Sixteen, &deep, 6, words(&[0, 1, 2, 4, 5, 6])),
+        ] {
+            for is_transparent in [false, true] {
+                let mut info = info([2, 1], color, depth);
+                let entries = match color {
+                    Grayscale => 2,
+                    Rgb => 6,
+                    Indexed => 2,
+                    GrayscaleAlpha | Rgba => 0,
+                };
+                if color == Indexed {
+                    info.palette = Some(vec![9, 8, 7, 255, 0, 1].into());
+                }
+                if is_transparent && entries > 0 {
+                    info.trns = Some(vec![0; entries].into());
+                }
+                let source = png(info, data);
+                let image = Image::parse(&source).unwrap();
+                assert_eq!(values(&image), expected, "{color:?} {depth:?}");
+                assert_eq!(image.bytes(), 2 * bytes, "{color:?} {depth:?}");
+            }
         }
     }
 
@@ -362,13 +430,25 @@ mod tests {
         assert_eq!(rotated.color(0, 7), upright.color(7, 39));
     }
 
+    /// Checks JPEG files that are cut off after the header, with and without zeros in place of the
+    /// rest.
     #[test]
-    fn truncated_jpeg_is_rejected() {
+    fn damaged_jpeg_is_noticed() {
         for bytes in JPEGS {
-            for kept in [bytes.len() / 4, bytes.len() / 2, bytes.len() - 40] {
-                let error = Image::parse(&file(bytes[..kept].into())).unwrap_err();
-                assert!(error.found.contains("the JPEG image cannot be read"), "{error}");
+            let whole = Image::parse(&file(bytes.into())).unwrap();
+            assert_eq!(whole.notes, [] as [String; 0]);
+            let start = bytes.windows(2).rposition(|pair| pair == [0xff, 0xda]).unwrap();
+            for kept in (start + 2..bytes.len() - 2).chain([20, bytes.len() / 4]) {
+                let part = bytes[..kept].to_vec();
+                let zeros = [&part, &vec![0; bytes.len() - kept][..]].concat();
+                for damaged in [part, zeros] {
+                    let image = Image::parse(&file(damaged));
+                    let is_accepted = image.is_ok_and(|image| image.notes.is_empty());
+                    assert!(!is_accepted, "{kept} bytes of {}", bytes.len());
+                }
             }
+            let trailing = [bytes, b"trailing bytes"].concat();
+            assert_eq!(Image::parse(&file(trailing)), Ok(whole));
         }
     }
 

@@ -10,11 +10,13 @@
 
 mod cache;
 mod error;
+mod exr;
 mod file;
 mod hdr;
 mod image;
 mod loaded;
 mod mesh;
+mod primaries;
 mod radiance_map;
 
 pub use cache::{Assets, LoadProgress};

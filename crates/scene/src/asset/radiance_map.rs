@@ -4,28 +4,27 @@
 //! the direction +y, the lower edge -y. The middle of the image is the direction -z. The direction
 //! +x is to the right of the middle, at a quarter of the image's width.
 
-use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::error::AssetError;
+use crate::asset::exr::ExrFile;
 use crate::asset::file::FileContents;
 use crate::asset::hdr::HdrFile;
 use crate::asset::image::{Image, ImageFormat, check_size};
 use crate::value::Fnv1a64;
-use exr::image::RgbChannels;
-use exr::math::Vec2;
-use exr::meta::attribute::Text;
-use exr::meta::header::Header;
-use exr::prelude::traits::*;
+use glam::DVec3;
 use std::f64::consts::{PI, TAU};
-use std::io::Cursor;
 use zerkalo_kernel::sampling::{PiecewiseConstant2D, PixelSample};
 
 /// Largest number of pixels in a row or column of an environment image.
-const MAX_MAP_SIDE: u32 = 16_384;
+pub(super) const MAX_MAP_SIDE: u32 = 16_384;
 
 /// Largest number of pixels of an environment image: 32 Mi, which take 403 MB.
-const MAX_MAP_PIXELS: u64 = 1 << 25;
+pub(super) const MAX_MAP_PIXELS: u64 = 1 << 25;
 
 /// Largest valid radiance of a pixel. That of the sun is about 2e7 W/(sr m^2).
 const MAX_RADIANCE: f32 = 1e15;
+
+/// Largest finite number of a half float, in which a brighter sun is infinite.
+const LARGEST_HALF: f32 = 65504.0;
 
 /// Radiance from all directions, for environment lights: linear, finite, at least 0.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +35,8 @@ pub struct RadianceMap {
     distribution: PiecewiseConstant2D,
     /// Mean radiance over all directions, weighted by solid angle.
     pub mean: [f64; 3],
+    /// Notes for the user about values of the file that were replaced: sentences without a period.
+    pub notes: Vec<String>,
 }
 
 /// Direction sampled by [`RadianceMap::sample`].
@@ -57,51 +58,44 @@ impl RadianceMap {
         assert!(!pixels.is_empty());
         let distribution = PiecewiseConstant2D::new(size.map(|n| n as usize), &pixels);
         let mean = distribution.mean(&pixels);
-        Self { size, pixels, distribution, mean }
+        Self { size, pixels, distribution, mean, notes: Vec::new() }
     }
 
     /// Decodes an environment image file. Values of PNG and JPEG files are sRGB levels. Negative
-    /// values are replaced by 0.
+    /// values are replaced by 0, and values that are no radiance as [`repair`] does.
     pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
-        match ImageFormat::of(&source.bytes) {
+        let check = |size| check_size(source, size, MAX_MAP_SIDE, MAX_MAP_PIXELS);
+        let (mut notes, mut matrix) = (Vec::new(), None);
+        let (size, mut pixels) = match ImageFormat::of(&source.bytes) {
             Some(ImageFormat::Hdr) => {
                 let file = HdrFile::parse(source)?;
-                check_size(source, file.size, MAX_MAP_SIDE, MAX_MAP_PIXELS)?;
-                Self::of_pixels(source, file.size, file.pixels(source)?)
+                check(file.size)?;
+                (file.size, file.pixels(source)?)
             }
             Some(ImageFormat::OpenExr) => {
-                let (size, pixels) = decode_exr(source)?;
-                Self::of_pixels(source, size, pixels)
+                let file = ExrFile::parse(source)?;
+                matrix = file.srgb_from_primaries;
+                (file.size, file.pixels(source)?)
             }
             Some(ImageFormat::Png | ImageFormat::Jpeg) => {
                 let image = Image::parse(source)?;
-                check_size(source, image.size(), MAX_MAP_SIDE, MAX_MAP_PIXELS)?;
+                check(image.size())?;
                 let [width, height] = image.size();
                 let row = |y| (0..width).map(move |x| (x, y));
                 let pixels = (0..height).flat_map(row).map(|(x, y)| image.color(x, y)).collect();
-                Ok(Self::new(image.size(), pixels))
+                notes = image.notes;
+                ([width, height], pixels)
             }
-            None => Err(source.fault("this is no image of a known format", EXPECTED)),
-        }
-    }
-
-    /// Creates the image of `pixels`, read from the file `source`. Negative values become zero.
-    /// Fails if a value is NaN or above [`MAX_RADIANCE`].
-    fn of_pixels(
-        source: &FileContents,
-        size: [u32; 2],
-        mut pixels: Vec<[f32; 3]>,
-    ) -> Result<Self, AssetError> {
-        for (i, pixel) in pixels.iter_mut().enumerate() {
-            if let Some(x) = pixel.iter().find(|x| x.is_nan() || **x > MAX_RADIANCE) {
-                let (column, row) = (i % size[0] as usize, i / size[0] as usize);
-                let place = FileLocation::Part(format!("pixel {column}, {row}"));
-                let found = format!("a channel is {x}");
-                return Err(source.error(place, found, "finite numbers up to 1e15"));
+            None => return Err(source.fault("this is no image of a known format", EXPECTED)),
+        };
+        notes.extend(repair(&mut pixels, size[0] as usize));
+        if let Some(srgb_from_primaries) = matrix {
+            for pixel in &mut pixels {
+                let color = srgb_from_primaries * DVec3::from(pixel.map(f64::from));
+                *pixel = color.max(DVec3::ZERO).to_array().map(|x| x as f32);
             }
-            *pixel = pixel.map(|x| x.max(0.0));
         }
-        Ok(Self::new(size, pixels))
+        Ok(Self { notes, ..Self::new(size, pixels) })
     }
 
     /// Adds size and pixels to `hash`.
@@ -174,50 +168,26 @@ fn position([x, y, z]: [f64; 3]) -> [f64; 2] {
 
 const EXPECTED: &str = "a Radiance HDR, OpenEXR, PNG or JPEG image";
 
-/// Decodes the display window of the first layer of an OpenEXR file that has the channels `R G B`
-/// and is not deep. Pixels outside the layer are black.
-fn decode_exr(source: &FileContents) -> Result<([u32; 2], Vec<[f32; 3]>), AssetError> {
-    let reader = exr::block::read(Cursor::new(&source.bytes[..]), false)
-        .map_err(|error| source.fault(format!("the header cannot be read: {error}"), EXPECTED))?;
-    let check = |size: Vec2<usize>| {
-        let size = [size.0, size.1].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
-        check_size(source, size, MAX_MAP_SIDE, MAX_MAP_PIXELS).map(|()| size)
+/// Replaces negative values and NaN by 0, and values that are infinite or above [`MAX_RADIANCE`] by
+/// the largest other value, at least [`LARGEST_HALF`]. Returns notes with the numbers of pixels.
+fn repair(pixels: &mut [[f32; 3]], columns: usize) -> Vec<String> {
+    let valid = pixels.iter().flatten().copied().filter(|x| *x <= MAX_RADIANCE);
+    let largest = valid.fold(LARGEST_HALF, f32::max);
+    let note = |is_bad: fn(&f32) -> bool, what: String| {
+        let mut bad = pixels.iter().enumerate().filter(|(_, pixel)| pixel.iter().any(is_bad));
+        let (first, _) = bad.next()?;
+        let (x, y, count) = (first % columns, first / columns, 1 + bad.count());
+        Some(format!("{what}: {count}, the first one in column {x}, row {y}"))
     };
-    // All sizes are checked first: the decoder allocates a block of rows before it reads it.
-    for header in reader.headers() {
-        check(header.layer_size)?;
-    }
-    let is_colored = |header: &&Header| {
-        let has = |name| header.channels.find_index_of_channel(&Text::from(name)).is_some();
-        !header.deep && ["R", "G", "B"].into_iter().all(has)
-    };
-    let header = reader.headers().iter().find(is_colored).ok_or_else(|| {
-        source.fault("no layer has the channels R, G and B without deep data", EXPECTED)
-    })?;
-    let window = header.shared_attributes.display_window;
-    let size = check(window.size)?;
-    let offset = header.own_attributes.layer_position - window.position;
-    let create = move |_, _: &RgbChannels| vec![[0.0; 3]; window.size.area()];
-    let set = move |pixels: &mut Vec<[f32; 3]>, position: Vec2<usize>, (r, g, b)| {
-        let Vec2(x, y) = position.to_i32() + offset;
-        if let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y))
-            && x < window.size.0
-            && y < window.size.1
-        {
-            pixels[y * window.size.0 + x] = [r, g, b];
-        }
-    };
-    let image = read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgb_channels(create, set)
-        .first_valid_layer()
-        .all_attributes()
-        .from_chunks(reader)
-        .map_err(|error| {
-            source.fault(format!("the OpenEXR image cannot be read: {error}"), EXPECTED)
-        })?;
-    Ok((size, image.layer_data.channel_data.pixels))
+    let notes = [
+        note(|x| x.is_nan(), "pixels that are no numbers (NaN), taken as 0".to_string()),
+        note(
+            |x| *x > MAX_RADIANCE,
+            format!("pixels that are infinite or above 1e15, taken as {largest}"),
+        ),
+    ];
+    pixels.iter_mut().flatten().for_each(|x| *x = x.max(0.0).min(largest));
+    notes.into_iter().flatten().collect()
 }
 
 #[cfg(test)]
@@ -226,7 +196,9 @@ mod tests {
     use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image as Picture, Layer};
     use exr::meta::attribute::IntegerBounds;
     use exr::meta::header::{ImageAttributes, LayerAttributes};
+    use exr::prelude::traits::*;
     use png::{BitDepth, ColorType, Encoder};
+    use std::io::Cursor;
     use std::path::PathBuf;
 
     fn source(bytes: Vec<u8>) -> FileContents {
@@ -281,6 +253,10 @@ FORMAT=32-bit_rle_rgbe
         assert_eq!(map.pixels[2 * 9 + 4], [128.0, 0.5, 2.0]);
         let map = RadianceMap::parse(&source(hdr())).unwrap();
         assert_eq!(map.pixels[9 + 8], [256.0; 3]);
+        for first in [&b"#?RGBE"[..], b"#?", b"#?AUTOPANO"] {
+            let map = RadianceMap::parse(&source([first, &hdr()[10..]].concat())).unwrap();
+            assert_eq!(map.pixels[9 + 8], [256.0; 3]);
+        }
         let bytes = [&hdr()[..11], b"EXPOSURE=4\n", &hdr()[11..]].concat();
         let map = RadianceMap::parse(&source(bytes)).unwrap();
         assert_eq!(map.pixels[9 + 8], [64.0; 3]);
@@ -295,16 +271,35 @@ FORMAT=32-bit_rle_rgbe
     }
 
     #[test]
-    fn negative_radiance_is_black_and_infinite_radiance_an_error() {
+    fn values_that_are_no_radiance_are_replaced_and_counted() {
         let mut pixels = floats();
         pixels[2 * 9 + 3] = [-1.0, 0.25, 0.5];
         let map = RadianceMap::parse(&source(exr(&pixels))).unwrap();
-        assert_eq!(map.pixels[2 * 9 + 3], [0.0, 0.25, 0.5]);
-        for bad in [f32::NAN, f32::INFINITY, 2e15] {
-            pixels[2 * 9 + 3] = [0.0, bad, 0.0];
-            let error = RadianceMap::parse(&source(exr(&pixels))).unwrap_err().to_string();
-            assert!(error.contains("pixel 3, 2"), "{error}");
+        assert_eq!((map.pixels[2 * 9 + 3], map.notes), ([0.0, 0.25, 0.5], Vec::new()));
+        const NAN: &str = "pixels that are no numbers (NaN), taken as 0";
+        const LARGE: &str = "pixels that are infinite or above 1e15, taken as";
+        for (bad, brightest, expected, note) in [
+            (f32::NAN, 1.0, 0.0, format!("{NAN}: 2, the first one in column 3, row 2")),
+            (-f32::NAN, 1.0, 0.0, format!("{NAN}: 2, the first one in column 3, row 2")),
+            (
+                f32::INFINITY,
+                1.0,
+                65504.0,
+                format!("{LARGE} 65504: 2, the first one in column 3, row 2"),
+            ),
+            (2e15, 1e7, 1e7, format!("{LARGE} 10000000: 2, the first one in column 3, row 2")),
+        ] {
+            pixels[2 * 9 + 3] = [bad, bad, 0.5];
+            pixels[3 * 9] = [0.0, bad, 0.0];
+            pixels[0][1] = brightest;
+            let map = RadianceMap::parse(&source(exr(&pixels))).unwrap();
+            assert_eq!(map.pixels[2 * 9 + 3], [expected, expected, 0.5]);
+            assert_eq!(map.notes, [note]);
         }
+        pixels[2 * 9 + 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+        pixels[3 * 9] = [0.0; 3];
+        let map = RadianceMap::parse(&source(exr(&pixels))).unwrap();
+        assert_eq!((map.pixels[2 * 9 + 3], map.notes.len()), ([0.0, 1e7, 0.0], 2));
     }
 
     #[test]
@@ -324,11 +319,6 @@ FORMAT=32-bit_rle_rgbe
             let expected = if x < 2 { [0.0; 3] } else { floats()[9 * (y + 1) + x - 2] };
             assert_eq!(*pixel, expected, "{x}, {y}");
         }
-        let mut bytes = Cursor::new(Vec::new());
-        let grey = Picture::from_layer(layer(["X", "Y", "Z"], &floats(), (0, 0)));
-        grey.write().to_buffered(&mut bytes).unwrap();
-        let found = RadianceMap::parse(&source(bytes.into_inner())).unwrap_err().found;
-        assert!(found.contains("no layer has"), "{found}");
     }
 
     #[test]

@@ -182,25 +182,27 @@ impl Bump {
 }
 
 impl crate::material::Material {
-    /// Returns the image files of the texture and the bump map: their names and contents.
-    fn loads(&self) -> impl Iterator<Item = (&str, &Loaded<Image>)> {
+    /// Returns the key, the file name and the loaded image of the texture and the bump map, if they name
+    /// a file.
+    pub fn image_files(&self) -> impl Iterator<Item = (&'static str, &str, Option<&Arc<Image>>)> {
         let texture = match &self.texture {
-            Some(Texture::Image(image)) => Some((image.file.as_str(), &image.content)),
+            Some(Texture::Image(image)) => Some(("texture", image.file.as_str(), image.content.content())),
             Some(Texture::Checker(_)) | None => None,
         };
         let bump = self.bump.as_ref();
-        let bump = bump.map(|Bump::Image(image)| (image.file.as_str(), &image.content));
-        texture.into_iter().chain(bump)
+        let bump = bump.map(|Bump::Image(image)| ("bump", image.file.as_str(), image.content.content()));
+        let both = [texture, bump];
+        both.into_iter().flatten().filter(|(_, file, _)| !file.is_empty())
     }
 
     /// Returns the names of the files of the texture and the bump map.
     pub fn files(&self) -> impl Iterator<Item = &str> {
-        self.loads().map(|(file, _)| file).filter(|file| !file.is_empty())
+        self.image_files().map(|(_, file, _)| file)
     }
 
     /// Returns the loaded images of the texture and the bump map.
     pub fn images(&self) -> impl Iterator<Item = &Arc<Image>> {
-        self.loads().filter_map(|(_, content)| content.content())
+        self.image_files().filter_map(|(.., image)| image)
     }
 
     /// Reads the files of texture and bump map with `load`, unless they are loaded already.

@@ -1,0 +1,348 @@
+//! OpenEXR files of environments: choice of the channels, display window, conversion of primaries.
+
+use crate::asset::error::AssetError;
+use crate::asset::file::FileContents;
+use crate::asset::image::check_size;
+use crate::asset::primaries;
+use crate::asset::radiance_map::{MAX_MAP_PIXELS, MAX_MAP_SIDE};
+use crate::value::truncated;
+use exr::math::Vec2;
+use exr::meta::attribute::{Chromaticities, EnvironmentMap, Text};
+use exr::meta::header::Header;
+use exr::prelude::traits::*;
+use glam::DMat3;
+use std::collections::BTreeMap;
+use std::io::Cursor;
+
+const EXPECTED: &str = "one layer that is not deep, with the channels R, G and B, or Y alone, as `exrheader` shows them";
+
+/// OpenEXR file whose headers have been read.
+pub struct ExrFile {
+    /// Width and height of the image in pixels.
+    pub size: [u32; 2],
+    channels: Channels,
+    /// Size of the display window, and the position of the layer in it.
+    window: Vec2<usize>,
+    offset: Vec2<i32>,
+    /// Matrix to linear sRGB from the primaries of the file; `None` if they are those of sRGB.
+    pub srgb_from_primaries: Option<DMat3>,
+}
+
+/// Names of the channels of an image.
+#[derive(Clone, Debug, PartialEq)]
+enum Channels {
+    Colors([Text; 3]),
+    Grey(Text),
+}
+
+impl ExrFile {
+    /// Reads the headers, and checks all sizes: the decoder allocates a block of rows before it reads
+    /// it.
+    pub fn parse(source: &FileContents) -> Result<Self, AssetError> {
+        let reader = exr::block::read(Cursor::new(&source.bytes[..]), false).map_err(|error| {
+            source.fault(format!("the header cannot be read: {error}"), EXPECTED)
+        })?;
+        let limit = |size: Vec2<usize>| {
+            let size = [size.0, size.1].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+            check_size(source, size, MAX_MAP_SIDE, MAX_MAP_PIXELS).map(|()| size)
+        };
+        for header in reader.headers() {
+            limit(header.layer_size)?;
+        }
+        let (layer, channels) =
+            choose(reader.headers()).map_err(|found| source.fault(found, EXPECTED))?;
+        let header = &reader.headers()[layer];
+        let window = header.shared_attributes.display_window;
+        let size = limit(window.size)?;
+        if header.own_attributes.environment_map == Some(EnvironmentMap::Cube) {
+            let expected = "an equirectangular image, as `exrenvmap -latlong` writes it";
+            return Err(source.fault("it is a cube map", expected));
+        }
+        let srgb_from_primaries = match header.shared_attributes.chromaticities {
+            Some(Chromaticities { red, green, blue, white }) => {
+                primaries::srgb_from([red, green, blue, white].map(|Vec2(x, y)| [x, y]))
+                    .map_err(|found| source.fault(found, "chromaticities such as those of sRGB"))?
+            }
+            None => None,
+        };
+        Ok(Self {
+            size,
+            channels,
+            window: window.size,
+            offset: header.own_attributes.layer_position - window.position,
+            srgb_from_primaries,
+        })
+    }
+
+    /// Decodes the pixels of the display window, row by row from the top. Pixels outside the layer
+    /// are black.
+    pub fn pixels(&self, source: &FileContents) -> Result<Vec<[f32; 3]>, AssetError> {
+        let (Vec2(width, height), offset) = (self.window, self.offset);
+        let set = move |pixels: &mut Vec<[f32; 3]>, position: Vec2<usize>, color: [f32; 3]| {
+            let Vec2(x, y) = position.to_i32() + offset;
+            if let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y))
+                && x < width
+                && y < height
+            {
+                pixels[y * width + x] = color;
+            }
+        };
+        let black = move || vec![[0.0; 3]; width * height];
+        let bytes = Cursor::new(&source.bytes[..]);
+        let layer = read().no_deep_data().largest_resolution_level().specific_channels();
+        let image = match self.channels.clone() {
+            Channels::Colors([r, g, b]) => layer
+                .required(r)
+                .required(g)
+                .required(b)
+                .collect_pixels(move |_, _| black(), move |p, at, (r, g, b)| set(p, at, [r, g, b]))
+                .first_valid_layer()
+                .all_attributes()
+                .from_buffered(bytes)
+                .map(|image| image.layer_data.channel_data.pixels),
+            Channels::Grey(y) => layer
+                .required(y)
+                .collect_pixels(move |_, _| black(), move |p, at, (y,)| set(p, at, [y; 3]))
+                .first_valid_layer()
+                .all_attributes()
+                .from_buffered(bytes)
+                .map(|image| image.layer_data.channel_data.pixels),
+        };
+        image.map_err(|error| {
+            let found = format!("the OpenEXR image cannot be read: {error}");
+            source.fault(found, "a whole image that is not deep")
+        })
+    }
+}
+
+/// Set of channels of an image: number of the layer, prefix of the names, names.
+type Set = (usize, String, Channels);
+
+/// Chooses the channels of the image: R, G and B of the first layer that has them; otherwise the only
+/// set of such channels after a prefix, or the only one named `Combined`, as Blender names the
+/// picture; otherwise Y in the same way. Case has no influence. Fails with a clause about the channels
+/// that were found.
+fn choose(headers: &[Header]) -> Result<(usize, Channels), String> {
+    let (mut colors, mut greys, mut all) = (Vec::new(), Vec::new(), Vec::new());
+    for (layer, header) in headers.iter().enumerate().filter(|(_, header)| !header.deep) {
+        let mut names = BTreeMap::new();
+        for channel in &header.channels.list {
+            names.entry(channel.name.to_string().to_lowercase()).or_insert(&channel.name);
+        }
+        for (name, text) in &names {
+            let (prefix, letter) = name.split_at(name.rfind('.').map_or(0, |dot| dot + 1));
+            let find = |letter: &str| names.get(&format!("{prefix}{letter}"));
+            // Beside channels of other colour spaces, or components of vectors, Y is not grey.
+            let is_alone = || ["x", "z", "ry", "by"].into_iter().all(|o| find(o).is_none());
+            match (letter, find("g"), find("b")) {
+                ("r", Some(green), Some(blue)) => {
+                    let channels = Channels::Colors([text, green, blue].map(|t| Text::clone(t)));
+                    colors.push((layer, prefix.to_string(), channels));
+                }
+                ("y", ..) if is_alone() => {
+                    greys.push((layer, prefix.to_string(), Channels::Grey(Text::clone(text))));
+                }
+                _ => {}
+            }
+        }
+        all.extend(names.into_keys());
+    }
+    let sets = if colors.is_empty() { greys } else { colors };
+    let only = |is_chosen: fn(&Set) -> bool| {
+        let mut chosen = sets.iter().filter(|set| is_chosen(set));
+        chosen.next().filter(|_| chosen.next().is_none())
+    };
+    let plain = sets.iter().find(|(_, prefix, _)| prefix.is_empty());
+    let chosen = plain.or_else(|| only(|_| true));
+    if let Some((layer, _, channels)) =
+        chosen.or_else(|| only(|(_, prefix, _)| prefix.ends_with("combined.")))
+    {
+        return Ok((*layer, channels.clone()));
+    }
+    let (found, names) = match sets.is_empty() {
+        true => ("no layer has the channels R, G and B without deep data", all),
+        false => ("several layers have colours", sets.into_iter().map(|set| set.1).collect()),
+    };
+    let listed: Vec<String> = names.iter().take(12).map(|name| truncated(name)).collect();
+    Err(format!("{found}: {}", listed.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::compression::Compression;
+    use exr::image::{
+        AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image as Picture, Layer,
+    };
+    use exr::meta::attribute::LineOrder;
+    use exr::meta::header::{ImageAttributes, LayerAttributes};
+    use exr::prelude::f16;
+    use std::path::PathBuf;
+
+    const SIZE: (usize, usize) = (70, 37);
+
+    fn source(bytes: Vec<u8>) -> FileContents {
+        FileContents { path: PathBuf::from("sky.exr"), bytes }
+    }
+
+    /// Returns the values of channel `number`, which half floats hold exactly.
+    fn values(number: usize) -> impl Iterator<Item = f32> {
+        (0..SIZE.0 * SIZE.1).map(move |i| ((i * (number + 3)) % 97) as f32 * 0.25 + 1.0)
+    }
+
+    fn layer(names: &[&str], encoding: Encoding) -> Layer<AnyChannels<FlatSamples>> {
+        let samples = |number| FlatSamples::F32(values(number).collect());
+        let channels = names.iter().enumerate().map(|(i, name)| AnyChannel::new(*name, samples(i)));
+        let attributes = LayerAttributes::named(names[0]);
+        Layer::new(SIZE, attributes, encoding, AnyChannels::sort(channels.collect()))
+    }
+
+    fn bytes_of(layers: Vec<Layer<AnyChannels<FlatSamples>>>) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        let window = exr::meta::attribute::IntegerBounds::from_dimensions(SIZE);
+        let picture = Picture::from_layers(ImageAttributes::new(window), layers);
+        picture.write().to_buffered(&mut bytes).unwrap();
+        bytes.into_inner()
+    }
+
+    fn read_pixels(bytes: Vec<u8>) -> Result<Vec<[f32; 3]>, AssetError> {
+        let source = source(bytes);
+        ExrFile::parse(&source)?.pixels(&source)
+    }
+
+    /// Checks all sample types in all compressions, blocks and line orders. B44 and DWA are lossy: B44
+    /// has at least 6 bits in a block of 4 x 4 pixels whose values are up to 25; DWA follows its level
+    /// 45, and these values are noise.
+    #[test]
+    fn all_encodings_are_decoded() {
+        let tiles = Blocks::Tiles(Vec2(16, 9));
+        let lossless = [
+            Compression::Uncompressed,
+            Compression::RLE,
+            Compression::ZIP1,
+            Compression::ZIP16,
+            Compression::PIZ,
+            Compression::PXR24,
+        ];
+        let lossy =
+            [Compression::B44, Compression::B44A, Compression::DWAA(None), Compression::DWAB(None)];
+        let methods = lossless.map(|method| (method, 0.0)).into_iter();
+        for (compression, tolerance) in methods.chain(lossy.map(|method| (method, 2.0))) {
+            for blocks in [Blocks::ScanLines, tiles] {
+                for line_order in [LineOrder::Increasing, LineOrder::Decreasing] {
+                    for half in [true, false] {
+                        let encoding = Encoding { compression, blocks, line_order };
+                        let mut layer = layer(&["R", "G", "B", "A"], encoding);
+                        for channel in &mut layer.channel_data.list {
+                            if half {
+                                let values = channel.sample_data.values_as_f32();
+                                let values = values.map(f16::from_f32).collect();
+                                channel.sample_data = FlatSamples::F16(values);
+                            }
+                        }
+                        let case = format!("{compression:?} {blocks:?} {line_order:?} {half}");
+                        let pixels = read_pixels(bytes_of(vec![layer])).expect(&case);
+                        for (i, x) in (0..3).flat_map(|c| values(c).enumerate()).enumerate() {
+                            let (c, (pixel, expected)) = (i / (SIZE.0 * SIZE.1), x);
+                            let found = pixels[pixel][c];
+                            assert!((found - expected).abs() <= tolerance, "{case}: {found}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn channels_are_chosen_by_their_names() {
+        let first: Vec<f32> = values(0).collect();
+        for (layers, expected) in [
+            (&[&["R", "G", "B"][..]][..], Ok([0, 1, 2])),
+            (&[&["r", "g", "b"]], Ok([0, 1, 2])),
+            (&[&["Y"]], Ok([0, 0, 0])),
+            (&[&["Y", "A"]], Ok([0, 0, 0])),
+            (&[&["V.Combined.R", "V.Combined.G", "V.Combined.B"]], Ok([0, 1, 2])),
+            (&[&["V.Depth.Z", "V.Combined.R", "V.Combined.G", "V.Combined.B"]], Ok([1, 2, 3])),
+            (
+                &[&["D.R", "D.G", "D.B", "V.Combined.R", "V.Combined.G", "V.Combined.B"]],
+                Ok([3, 4, 5]),
+            ),
+            (&[&["a.r", "a.g", "a.b", "R", "G", "B"]], Ok([3, 4, 5])),
+            (&[&["X", "Y", "Z"], &["R", "G", "B"]], Ok([0, 1, 2])),
+            (&[&["Z"], &["l.Y"]], Ok([0, 0, 0])),
+            (&[&["X", "Y", "Z"]], Err("no layer has the channels R, G and B")),
+            (&[&["Y", "RY", "BY"]], Err("without deep data: by, ry, y")),
+            (&[&["R", "G"]], Err("without deep data: g, r")),
+            (&[&["a.R", "a.G", "b.B"]], Err("no layer has")),
+            (
+                &[&["a.R", "a.G", "a.B", "b.R", "b.G", "b.B"]],
+                Err("several layers have colours: a., b."),
+            ),
+        ] {
+            let pictures = layers.iter().map(|names| layer(names, Encoding::SMALL_LOSSLESS));
+            let pixels = read_pixels(bytes_of(pictures.collect()));
+            match (pixels, expected) {
+                (Ok(pixels), Ok(numbers)) => {
+                    assert_eq!(pixels[1], numbers.map(|n| values(n).nth(1).unwrap()), "{layers:?}");
+                    assert_eq!(pixels.len(), first.len());
+                }
+                (Err(error), Err(words)) => assert!(error.found.contains(words), "{error}"),
+                (found, _) => panic!("{layers:?}: {:?}", found.map(|pixels| pixels[0])),
+            }
+        }
+    }
+
+    fn picture_with(
+        size: (usize, usize),
+        pixels: &[[f32; 3]],
+        change: impl Fn(&mut ImageAttributes, &mut LayerAttributes),
+    ) -> Vec<u8> {
+        let samples = |c: usize| FlatSamples::F32(pixels.iter().map(|pixel| pixel[c]).collect());
+        let channels = ["R", "G", "B"].into_iter().enumerate();
+        let channels = channels.map(|(i, name)| AnyChannel::new(name, samples(i))).collect();
+        let window = exr::meta::attribute::IntegerBounds::from_dimensions(size);
+        let (mut image, mut own) = (ImageAttributes::new(window), LayerAttributes::default());
+        change(&mut image, &mut own);
+        let layer = Layer::new(size, own, Encoding::UNCOMPRESSED, AnyChannels::sort(channels));
+        let mut bytes = Cursor::new(Vec::new());
+        Picture::new(image, layer).write().to_buffered(&mut bytes).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn chromaticities_are_converted() {
+        let chromaticities = |red, green| Chromaticities {
+            red,
+            green,
+            blue: Vec2(0.15, 0.06),
+            white: Vec2(0.3127, 0.329),
+        };
+        let read = |red, green| {
+            let bytes = picture_with((1, 1), &[[8.0, 2.0, 1.0]], |image, _| {
+                image.chromaticities = Some(chromaticities(red, green));
+            });
+            let map = crate::asset::RadianceMap::parse(&source(bytes))?;
+            Ok::<_, AssetError>(map.radiance([0.0, 0.0, -1.0]))
+        };
+        assert_eq!(read(Vec2(0.64, 0.33), Vec2(0.3, 0.6)), Ok([8.0, 2.0, 1.0]));
+        let exchanged = read(Vec2(0.3, 0.6), Vec2(0.64, 0.33)).unwrap();
+        let expected = [2.0, 8.0, 1.0];
+        assert!((0..3).all(|c| (exchanged[c] - expected[c]).abs() < 1e-5), "{exchanged:?}");
+        let error = read(Vec2(0.3, 0.6), Vec2(0.3, 0.6)).unwrap_err().to_string();
+        assert!(error.contains("determine no colours. Expected chromaticities such as"), "{error}");
+    }
+
+    #[test]
+    fn cube_maps_are_refused() {
+        let cube = picture_with((4, 24), &[[1.0; 3]; 96], |_, own| {
+            own.environment_map = Some(EnvironmentMap::Cube);
+        });
+        let error = read_pixels(cube).unwrap_err().to_string();
+        let words = "it is a cube map. Expected an equirectangular image, as `exrenvmap -latlong`";
+        assert!(error.contains(words), "{error}");
+        let flat = picture_with((4, 2), &[[1.0; 3]; 8], |_, own| {
+            own.environment_map = Some(EnvironmentMap::LatitudeLongitude);
+        });
+        assert_eq!(read_pixels(flat), Ok(vec![[1.0; 3]; 8]));
+    }
+}
