@@ -297,3 +297,42 @@ fn scenes_and_meshes_that_do_not_fit_are_refused() {
         assert!(fits, "{scene} fits into 1.6 GB");
     }
 }
+
+/// Checks that images whose sum does not fit into the address space are refused before one of them is
+/// decoded, and that they are rendered if they fit.
+#[test]
+#[cfg(target_os = "linux")]
+fn images_that_do_not_fit_together_are_refused() {
+    let desk = Desk::new();
+    let pixels = vec![200; 3 * 3000 * 3000];
+    let png = zerkalo_render::image_file::png_of_rgb([3000, 3000], &pixels).unwrap();
+    let mut textures = SCENE.to_string();
+    for i in 0..40 {
+        fs::write(desk.path(&format!("{i}.png")), &png).unwrap();
+        writeln!(textures, "[materials.m{i}]\ntexture.image.file = \"{i}.png\"").unwrap();
+    }
+    // An old run of 256 * 128 pixels takes 8 bytes of a row.
+    let row = [[9; 4], [1, 1, 1, 255], [1, 1, 1, 63]].concat();
+    let hdr = [&b"#?RADIANCE\n\n-Y 2000 +X 16384\n"[..], &row.repeat(2000)].concat();
+    fs::write(desk.path("sky.hdr"), hdr).unwrap();
+    let sky = format!("{SCENE}[[light]]\nenvironment.file = \"sky.hdr\"\n");
+    for (name, scene, words) in [
+        ("textures.toml", textures, "with the other 39 files of the scene, this file needs 1."),
+        ("sky.toml", sky, "sky.hdr: the file needs "),
+    ] {
+        fs::write(desk.path(name), scene).unwrap();
+        let mut fits = false;
+        for megabytes in [600, 900, 1300, 1600, 2400, 4000] {
+            let limit = format!("ulimit -v {}", 1000 * megabytes);
+            let command = format!("exec \"$0\" check {name}");
+            let mut shell = Command::new("sh");
+            shell.args(["-c", &format!("{limit}; {command}"), env!("CARGO_BIN_EXE_zerkalo")]);
+            let run = Run::from(shell.current_dir(desk.0.path()).output().unwrap());
+            fits |= run.status == 0;
+            let refused = run.status == 1 && run.err.contains(words) && run.err.lines().count() < 4;
+            assert!(run.status == 0 || refused, "{command}, {limit}: {} {}", run.status, run.err);
+            assert!(megabytes > 600 || refused, "{command}, {limit}");
+        }
+        assert!(fits, "{name} fits into 4 GB");
+    }
+}

@@ -248,7 +248,7 @@ impl Spot<'_> {
 
 impl Tracer<'_> {
     pub fn open_images(&mut self, material: &Material) -> Result<(), String> {
-        for file in material.files() {
+        for (_, file, _) in material.image_files() {
             if !self.images.contains_key(file) {
                 self.images.insert(file.to_string(), Pixels::open(file)?);
             }

@@ -1,6 +1,6 @@
 //! Resolver of the mesh and image files that a scene refers to.
 
-use crate::asset::Assets;
+use crate::asset::{AssetError, Assets, Reading};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
@@ -37,6 +37,21 @@ impl AssetResolver {
     /// Returns the path of the file `name`.
     pub(super) fn path(&self, name: &str) -> PathBuf {
         self.folder.read().unwrap_or_else(PoisonError::into_inner).join(name)
+    }
+
+    /// Reads the file `name` by `read`. If the files of the scene are `refused` because of their sum,
+    /// none is read: one of them gets the error.
+    pub(super) fn load<T>(
+        &self,
+        name: &str,
+        refused: Option<&AssetError>,
+        read: impl Fn(&Assets, &Path) -> Result<Arc<T>, AssetError>,
+    ) -> Reading<T> {
+        let path = self.path(name);
+        match refused {
+            Some(error) => (error.file == path).then(|| Err(error.clone())),
+            None => Some(read(&self.assets, &path)),
+        }
     }
 
     /// Returns `true` if `name` leads to a file now, but to another file or to none once the scene

@@ -181,14 +181,8 @@ impl SceneFile {
         overwrite: bool,
     ) -> Result<(), SaveError> {
         let resolver = &scene.resolver;
-        let meshes = scene.objects.iter().filter_map(|object| object.shape.file());
-        let images = scene.materials.values().flat_map(|material| material.files());
-        let environments = scene.lights.iter().filter_map(|light| light.environment()?.file());
-        if let Some(file) = meshes
-            .chain(images)
-            .chain(environments)
-            .find(|file| resolver.breaks_when_moved(file, path))
-        {
+        let mut files = scene.files().map(|(_, file)| file);
+        if let Some(file) = files.find(|file| resolver.breaks_when_moved(file, path)) {
             let file = sanitized(file);
             return Err(SaveError::Failed {
                 path: path.to_path_buf(),

@@ -1,12 +1,14 @@
 //! Semantic validation of a scene: values out of range, names that are undefined or not unique.
 
 use crate::Scene;
+use crate::asset::{AssetKind, Assets};
 use crate::diagnostic::MAX_REPORTED;
 use crate::format::suggest::did_you_mean;
 use crate::light::Light;
 use crate::material::Mapping;
 use crate::value::{KeyNode, ValidationError, truncated};
 use std::borrow::Cow;
+use std::cell::LazyCell;
 use std::collections::HashMap;
 use std::fmt;
 
@@ -94,18 +96,31 @@ impl Scene {
         Problem { subject: self.subject(&path), path, found, help }
     }
 
-    /// Loads the files that the scene refers to and that are not loaded yet. Unreadable files are
-    /// errors in the next validation.
+    /// Returns the names of the files that the scene refers to.
+    pub(super) fn files(&self) -> impl Iterator<Item = (AssetKind, &str)> {
+        let meshes = self.objects.iter().filter_map(|object| object.shape.file());
+        let images = self.materials.values().flat_map(|material| material.image_files());
+        let environments = self.lights.iter().filter_map(|light| light.environment()?.file());
+        meshes
+            .map(|name| (AssetKind::Mesh, name))
+            .chain(images.map(|(_, name, _)| (AssetKind::Texture, name)))
+            .chain(environments.map(|name| (AssetKind::Environment, name)))
+    }
+
+    /// Loads the files that the scene refers to and that are not loaded yet, if they fit into memory
+    /// together. Unreadable files are errors in the next validation.
     pub fn resolve(&mut self) {
-        let (resolver, assets) = (&self.resolver, &self.resolver.assets);
+        let resolver = self.resolver.clone();
+        let files: Vec<_> = self.files().map(|(kind, name)| (kind, resolver.path(name))).collect();
+        let refused = LazyCell::new(|| resolver.assets.check_total_memory(&files).err());
         for object in &mut self.objects {
-            object.shape.resolve(|name| assets.mesh(&resolver.path(name)));
+            object.shape.resolve(|name| resolver.load(name, refused.as_ref(), Assets::mesh));
         }
-        for environment in self.lights.iter_mut().filter_map(Light::environment_mut) {
-            environment.resolve(|name| assets.radiance_map(&resolver.path(name)));
+        for light in self.lights.iter_mut().filter_map(Light::environment_mut) {
+            light.resolve(|name| resolver.load(name, refused.as_ref(), Assets::radiance_map));
         }
         for material in self.materials.values_mut() {
-            material.resolve(|name| assets.image(&resolver.path(name)));
+            material.resolve(|name| resolver.load(name, refused.as_ref(), Assets::image));
         }
     }
 

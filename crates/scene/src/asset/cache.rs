@@ -3,9 +3,11 @@
 use crate::asset::error::AssetError;
 use crate::asset::file::{FileContents, MAX_BYTES, read_error};
 use crate::asset::image::Image;
+use crate::asset::memory::{AssetKind, asset_memory};
 use crate::asset::mesh;
 use crate::asset::radiance_map::RadianceMap;
 use crate::process_memory::missing_memory;
+use std::collections::HashSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -69,7 +71,22 @@ type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
 /// Files of one type, the most recently used first.
 struct Cache<T>(Vec<(Key, CacheEntry<T>)>);
 
+impl Key {
+    fn of(path: &Path) -> Result<Self, AssetError> {
+        let metadata = std::fs::metadata(path).map_err(|e| read_error(path, &e))?;
+        Ok(Self {
+            path: std::fs::canonicalize(path).map_err(|e| read_error(path, &e))?,
+            modified: metadata.modified().ok(),
+            bytes: metadata.len(),
+        })
+    }
+}
+
 impl<T> Cache<T> {
+    fn has(&self, key: &Key) -> bool {
+        self.0.iter().any(|(known, _)| known == key)
+    }
+
     /// Returns the entry for `key`, a new one if necessary. Removes other versions of the file.
     fn entry(&mut self, key: Key) -> CacheEntry<T> {
         let known = self.0.iter().find(|(k, _)| *k == key).map(|(_, entry)| entry.clone());
@@ -155,6 +172,39 @@ impl Assets {
         load(&self.radiance_maps, path, read, RadianceMap::bytes)
     }
 
+    /// Checks that the files that are not in the cache fit into memory together, by their headers.
+    ///
+    /// # Errors
+    /// Fails with an error of the largest file.
+    pub fn check_total_memory(&self, files: &[(AssetKind, PathBuf)]) -> Result<(), AssetError> {
+        let (mut sum, mut decoding, mut largest) = (0u64, 0, (0, Path::new("")));
+        let mut counted = HashSet::new();
+        for (kind, path) in files {
+            let Ok(key) = Key::of(path) else { continue };
+            let is_cached = match kind {
+                AssetKind::Mesh => locked(&self.meshes).has(&key),
+                AssetKind::Texture => locked(&self.images).has(&key),
+                AssetKind::Environment => locked(&self.radiance_maps).has(&key),
+            };
+            let length = key.bytes;
+            if !is_cached && counted.insert((kind, key.path)) {
+                let [kept, further] = asset_memory(*kind, path, length);
+                sum = sum.saturating_add(kept);
+                decoding = decoding.max(further);
+                largest = largest.max((kept, path));
+            }
+        }
+        let missing = missing_memory(sum.saturating_add(decoding)).filter(|_| sum > 0);
+        missing.map_or(Ok(()), |missing| {
+            let found = match counted.len() {
+                1 => format!("the file {missing}"),
+                n => format!("with the other {} files of the scene, this file {missing}", n - 1),
+            };
+            let expected = "fewer or smaller meshes and images, or more free memory";
+            Err(AssetError::of_file(largest.1, found, expected))
+        })
+    }
+
     fn read(&self, path: &Path, key: &Key, limit: u64) -> Result<FileContents, AssetError> {
         (self.progress)(&LoadProgress::Reading { file: path.to_path_buf(), bytes: key.bytes });
         FileContents::read(path, limit)
@@ -182,12 +232,7 @@ fn load<T>(
     read: impl FnOnce(&Key) -> Result<T, AssetError>,
     bytes_of: impl Fn(&T) -> usize,
 ) -> Result<Arc<T>, AssetError> {
-    let metadata = std::fs::metadata(path).map_err(|e| read_error(path, &e))?;
-    let key = Key {
-        path: std::fs::canonicalize(path).map_err(|e| read_error(path, &e))?,
-        modified: metadata.modified().ok(),
-        bytes: metadata.len(),
-    };
+    let key = Key::of(path)?;
     let entry = locked(cache).entry(key.clone());
     let file = entry.get_or_init(|| read(&key).map(Arc::new)).clone();
     locked(cache).evict(bytes_of);
@@ -245,6 +290,35 @@ mod tests {
         }
         assert_eq!(reads.load(Ordering::SeqCst), 1);
         assert!(assets.mesh(folder.path()).unwrap_err().found.contains("not a regular file"));
+    }
+
+    /// Checks that files are refused by the sum of their headers, of which none is decoded. Each of
+    /// them is short, and declares an environment that takes half a gigabyte.
+    #[test]
+    fn sum_of_all_files_is_compared_with_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let files: Vec<_> = (0..1000)
+            .map(|i| {
+                let path = folder.path().join(format!("{i}.hdr"));
+                let rows = [0; 4100];
+                let header = b"#?RADIANCE\n\n-Y 4096 +X 8192\n";
+                std::fs::write(&path, [&header[..], &rows].concat()).unwrap();
+                (AssetKind::Environment, path)
+            })
+            .collect();
+        let (assets, reads) = counted();
+        let error = assets.check_total_memory(&files).unwrap_err();
+        let words = "with the other 999 files of the scene, this file needs 53";
+        assert!(error.found.starts_with(words), "{error}");
+        assert!(error.found.contains(" GB of memory, and "), "{error}");
+        assert!(error.expected.contains("fewer or smaller"), "{error}");
+        assert_eq!(reads.load(Ordering::SeqCst), 0);
+        // The same file counts once, and files that cannot be read or have no header count as nothing.
+        let once = vec![files[0].clone(); 1000];
+        assert_eq!(assets.check_total_memory(&once), Ok(()));
+        std::fs::write(&files[0].1, "no image").unwrap();
+        let other = vec![files[0].clone(), (AssetKind::Texture, folder.path().join("none.png"))];
+        assert_eq!(assets.check_total_memory(&other), Ok(()));
     }
 
     #[test]

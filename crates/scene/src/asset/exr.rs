@@ -7,6 +7,7 @@ use crate::asset::primaries;
 use crate::asset::radiance_map::{MAX_MAP_PIXELS, MAX_MAP_SIDE};
 use crate::value::truncated;
 use exr::math::Vec2;
+use exr::meta::BlockDescription;
 use exr::meta::attribute::{Chromaticities, EnvironmentMap, Text};
 use exr::meta::header::Header;
 use exr::prelude::traits::*;
@@ -20,6 +21,8 @@ const EXPECTED: &str = "one layer that is not deep, with the channels R, G and B
 pub struct ExrFile {
     /// Width and height of the image in pixels.
     pub size: [u32; 2],
+    /// Memory \[bytes\] of a row of blocks, which the decoder allocates before it reads them.
+    pub block_bytes: u64,
     channels: Channels,
     /// Size of the display window, and the position of the layer in it.
     window: Vec2<usize>,
@@ -67,6 +70,7 @@ impl ExrFile {
         };
         Ok(Self {
             size,
+            block_bytes: block_bytes(header),
             channels,
             window: window.size,
             offset: header.own_attributes.layer_position - window.position,
@@ -165,6 +169,16 @@ fn choose(headers: &[Header]) -> Result<(usize, Channels), String> {
     };
     let listed: Vec<String> = names.iter().take(12).map(|name| truncated(name)).collect();
     Err(format!("{found}: {}", listed.join(", ")))
+}
+
+fn block_bytes(header: &Header) -> u64 {
+    let Vec2(width, height) = header.layer_size;
+    let rows = match header.blocks {
+        BlockDescription::ScanLines => header.compression.scan_lines_per_block(),
+        BlockDescription::Tiles(tiles) => tiles.tile_size.1,
+    };
+    let pixels = width as u64 * rows.min(height) as u64;
+    pixels * header.channels.bytes_per_pixel as u64
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 use crate::asset::error::{AssetError, FileLocation};
 use crate::disk::open_regular;
 use crate::process_memory::megabytes;
+use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 
@@ -11,6 +12,7 @@ use std::path::{Component, Path, PathBuf};
 pub const MAX_BYTES: u64 = 2 << 30;
 
 /// Asset file in memory.
+#[derive(Clone, Debug)]
 pub struct FileContents {
     /// Path of the file.
     pub path: PathBuf,
@@ -22,12 +24,7 @@ impl FileContents {
     /// Reads the file at `path`, which may have at most `limit` bytes.
     pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
         let error = |found: String, expected: &str| Err(AssetError::of_file(path, found, expected));
-        let file = match open_regular(path) {
-            Err(e) if e.kind() == ErrorKind::InvalidInput => {
-                return error(e.to_string(), "a regular file");
-            }
-            opened => opened.map_err(|e| read_error(path, &e))?,
-        };
+        let file = open(path)?;
         let metadata = file.metadata().map_err(|e| read_error(path, &e))?;
         if metadata.len() > limit {
             let found = format!("the file has {} MiB", metadata.len() >> 20);
@@ -44,6 +41,14 @@ impl FileContents {
             let found = "the file grew while it was read".to_string();
             return error(found, &format!("at most {} MiB", limit >> 20));
         }
+        Ok(Self { path: path.to_path_buf(), bytes })
+    }
+
+    /// Reads the first `length` bytes of the file at `path`, or all of them if there are fewer.
+    pub fn read_start(path: &Path, length: u64) -> Result<Self, AssetError> {
+        let mut bytes = Vec::new();
+        let read = open(path)?.take(length).read_to_end(&mut bytes);
+        read.map_err(|e| read_error(path, &e))?;
         Ok(Self { path: path.to_path_buf(), bytes })
     }
 
@@ -74,6 +79,13 @@ impl FileContents {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         (inside && !drive && !name.is_empty()).then(|| folder.join(name))
     }
+}
+
+fn open(path: &Path) -> Result<File, AssetError> {
+    open_regular(path).map_err(|error| match error.kind() {
+        ErrorKind::InvalidInput => AssetError::of_file(path, error.to_string(), "a regular file"),
+        _ => read_error(path, &error),
+    })
 }
 
 /// Converts an I/O error that occurred while the file at `path` was read.

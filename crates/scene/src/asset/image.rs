@@ -2,6 +2,7 @@
 
 use crate::asset::error::AssetError;
 use crate::asset::file::FileContents;
+use crate::asset::memory::ImageMemory;
 use crate::value::{Fnv1a64, linear_from_srgb};
 use image::codecs::png::PngDecoder;
 use image::metadata::Orientation;
@@ -96,6 +97,27 @@ impl Image {
                 Err(source.fault("this is neither a PNG nor a JPEG", EXPECTED))
             }
         }
+    }
+
+    /// Returns the memory of the image in a file that begins with `start`. Levels keep their depth.
+    pub(super) fn memory(start: &FileContents) -> Result<ImageMemory, AssetError> {
+        // With the levels, the decoder has a copy that is turned upright, or without alpha.
+        let (size, color, decoding) = match ImageFormat::of(&start.bytes) {
+            Some(ImageFormat::Jpeg) => {
+                let JpegHeader { size, color, .. } = jpeg_header(start)?;
+                // Up to four components have coefficients of 16 bits.
+                let bytes = 4 * 2 + u64::from(color.bytes_per_pixel());
+                (size, color, bytes * u64::from(size[0]) * u64::from(size[1]))
+            }
+            Some(ImageFormat::Png | ImageFormat::Hdr | ImageFormat::OpenExr) | None => {
+                let decoder = png_decoder(start)?;
+                (decoder.dimensions().into(), decoder.color_type(), 2 * decoder.total_bytes())
+            }
+        };
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let depth = u64::from(color.bytes_per_pixel() / color.channel_count());
+        let channels = if color.has_color() { 3 } else { 1 };
+        Ok(ImageMemory { size, kept: pixels * depth * channels, decoding })
     }
 
     /// Converts `image` to a texture image without alpha, turned upright by its EXIF data.
@@ -372,6 +394,8 @@ mod tests {
                 let image = Image::parse(&source).unwrap();
                 assert_eq!(values(&image), expected, "{color:?} {depth:?}");
                 assert_eq!(image.bytes(), 2 * bytes, "{color:?} {depth:?}");
+                let memory = Image::memory(&source).unwrap();
+                assert_eq!((memory.size, memory.kept), ([2, 1], 2 * bytes as u64), "{color:?}");
             }
         }
     }

@@ -5,6 +5,9 @@ use crate::value::ValidationError;
 use std::fmt;
 use std::sync::Arc;
 
+/// Result of reading an asset file; `None` if it was not read.
+pub type Reading<T> = Option<Result<Arc<T>, AssetError>>;
+
 /// Name and content of an asset file, or the error of reading it. `None` before it is read.
 pub struct Loaded<T>(Option<(String, Result<Arc<T>, AssetError>)>);
 
@@ -50,10 +53,13 @@ impl<T> Loaded<T> {
     }
 
     /// Loads the file `name`, unless it was the last one to be loaded, even if that failed. An
-    /// empty name means no file.
-    pub fn resolve(&mut self, name: &str, load: impl FnOnce(&str) -> Result<Arc<T>, AssetError>) {
+    /// empty name means no file. If `load` returns `None`, no file is loaded.
+    pub fn resolve(&mut self, name: &str, load: impl FnOnce(&str) -> Reading<T>) {
         if self.0.as_ref().map_or("", |(known, _)| known) != name {
-            self.0 = (!name.is_empty()).then(|| (name.to_string(), load(name)));
+            self.0 = None;
+            if !name.is_empty() {
+                self.0 = load(name).map(|result| (name.to_string(), result));
+            }
         }
     }
 

@@ -9,6 +9,7 @@ use crate::asset::exr::ExrFile;
 use crate::asset::file::FileContents;
 use crate::asset::hdr::HdrFile;
 use crate::asset::image::{Image, ImageFormat, check_size};
+use crate::asset::memory::ImageMemory;
 use crate::value::Fnv1a64;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
@@ -96,6 +97,27 @@ impl RadianceMap {
             }
         }
         Ok(Self { notes, ..Self::new(size, pixels) })
+    }
+
+    /// Returns the memory of the environment in a file that begins with `start`.
+    pub(super) fn memory(start: &FileContents) -> Result<ImageMemory, AssetError> {
+        let ([width, height], decoding) = match ImageFormat::of(&start.bytes) {
+            Some(ImageFormat::Hdr) => (HdrFile::parse(start)?.size, 0),
+            Some(ImageFormat::OpenExr) => {
+                let file = ExrFile::parse(start)?;
+                // A compressed block, the decoded one, and a copy of it in another order.
+                (file.size, 3 * file.block_bytes)
+            }
+            Some(ImageFormat::Png | ImageFormat::Jpeg) | None => {
+                let image = Image::memory(start)?;
+                (image.size, image.kept + image.decoding)
+            }
+        };
+        let size = [width, height];
+        check_size(start, size, MAX_MAP_SIDE, MAX_MAP_PIXELS)?;
+        // A pixel, and its entry in the sampling distribution.
+        let bytes = (size_of::<[f32; 3]>() + size_of::<f32>()) as u64;
+        Ok(ImageMemory { size, kept: bytes * u64::from(width) * u64::from(height), decoding })
     }
 
     /// Adds size and pixels to `hash`.

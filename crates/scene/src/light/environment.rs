@@ -5,7 +5,7 @@
 //! environment = { zenith = [0.2, 0.4, 0.9], horizon = [0.9, 0.9, 0.8], nadir = [0.2, 0.2, 0.2] }
 //! ```
 
-use crate::asset::{AssetError, Loaded, RadianceMap};
+use crate::asset::{Loaded, RadianceMap, Reading};
 use crate::light::{LightDesc, LightForm, LightSample};
 use crate::value::{Color, description};
 use std::f64::consts::PI;
@@ -47,7 +47,7 @@ impl Environment {
     }
 
     /// Reads the image with `load`, unless it is loaded already.
-    pub fn resolve(&mut self, load: impl FnOnce(&str) -> Result<Arc<RadianceMap>, AssetError>) {
+    pub fn resolve(&mut self, load: impl FnOnce(&str) -> Reading<RadianceMap>) {
         self.map.resolve(&self.file, load);
     }
 
@@ -199,7 +199,7 @@ mod tests {
         let map = Arc::new(RadianceMap::new([4, 2], pixels));
         let mut environment =
             Environment { file: "a".to_string(), rotation: 90.0, ..Environment::default() };
-        environment.resolve(|_| Ok(map));
+        environment.resolve(|_| Some(Ok(map)));
         let light = light(environment);
         assert!((radiance(&light, [-1.0, 0.0, 0.0])[0] - 1.0).abs() < 1e-12);
         assert!(radiance(&light, [1.0, 0.0, 0.0])[0].abs() < 1e-12);

@@ -7,7 +7,7 @@
 //! bump.image = { file = "bricks.png", height = 0.02 }
 //! ```
 
-use crate::asset::{AssetError, Image, Loaded};
+use crate::asset::{Image, Loaded, Reading};
 use crate::value::{Color, Description, choices, description, one_of};
 use std::sync::Arc;
 
@@ -195,18 +195,13 @@ impl crate::material::Material {
         both.into_iter().flatten().filter(|(_, file, _)| !file.is_empty())
     }
 
-    /// Returns the names of the files of the texture and the bump map.
-    pub fn files(&self) -> impl Iterator<Item = &str> {
-        self.image_files().map(|(_, file, _)| file)
-    }
-
     /// Returns the loaded images of the texture and the bump map.
     pub fn images(&self) -> impl Iterator<Item = &Arc<Image>> {
         self.image_files().filter_map(|(.., image)| image)
     }
 
     /// Reads the files of texture and bump map with `load`, unless they are loaded already.
-    pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Image>, AssetError>) {
+    pub fn resolve(&mut self, load: impl Fn(&str) -> Reading<Image>) {
         if let Some(Texture::Image(image)) = &mut self.texture {
             image.content.resolve(&image.file, &load);
         }

@@ -1,6 +1,6 @@
 //! Triangle meshes from files.
 
-use crate::asset::{AssetError, CREASE_ANGLE, FileContents, Loaded, parse_mesh};
+use crate::asset::{CREASE_ANGLE, FileContents, Loaded, Reading, parse_mesh};
 use crate::shape::{Shape, ShapeDesc};
 use crate::value::{choices, description};
 use glam::DAffine3;
@@ -73,7 +73,7 @@ impl ShapeDesc for MeshDesc {
 
 impl Shape {
     /// Reads, by `load`, the mesh file that the shape names, unless it is loaded already.
-    pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
+    pub fn resolve(&mut self, load: impl Fn(&str) -> Reading<Mesh>) {
         if let Self::MeshDesc(mesh) = self {
             mesh.content.resolve(&mesh.file, load);
         }
