@@ -7,6 +7,7 @@ use zerkalo_render::SampleInputs;
 use zerkalo_render::export::{scene_hash, settings_text};
 use zerkalo_render::image_file::FileMetadata;
 use zerkalo_render::plan::{BASE, Part, Plan, is_plan_file};
+use zerkalo_scene::value::sanitized;
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     let mut origin = match is_plan_file(&args.file) {
@@ -23,8 +24,11 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     let [width, height] = origin.size;
     let (path, format) = (args.file.display(), origin.format);
     print_line(&format!("{path}: {format}, {width} x {height} pixels"))?;
-    let widest = origin.entries.iter().map(|(key, _)| key.len()).max().unwrap_or(0);
-    for (key, value) in &origin.entries {
+    // The texts of a file must not look like further lines.
+    let entries = origin.entries.iter().map(|(key, value)| [sanitized(key), sanitized(value)]);
+    let entries: Vec<_> = entries.collect();
+    let widest = entries.iter().map(|[key, _]| key.len()).max().unwrap_or(0);
+    for [key, value] in entries {
         print_line(&format!("  {key:widest$}  {value}"))?;
     }
     match &args.scene {

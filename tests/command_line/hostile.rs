@@ -336,3 +336,17 @@ fn images_that_do_not_fit_together_are_refused() {
         assert!(fits, "{name} fits into 4 GB");
     }
 }
+
+#[test]
+fn metadata_cannot_forge_lines() {
+    let desk = Desk::new();
+    let mut encoder = png::Encoder::new(fs::File::create(desk.path("a.png")).unwrap(), 1, 1);
+    let forged = "a\n  Scene hash  0123".to_string();
+    encoder.add_text_chunk("Source".to_string(), forged.clone()).unwrap();
+    encoder.add_itxt_chunk("Software".to_string(), forged).unwrap();
+    encoder.write_header().unwrap().write_image_data(&[0]).unwrap();
+    let run = desk.run(&["info", "a.png"]);
+    assert_eq!(run.status, 0, "{}", run.err);
+    assert_eq!(run.out.lines().count(), 3, "{}", run.out);
+    assert!(run.out.contains("  Source    a\\n  Scene hash  0123\n"), "{}", run.out);
+}

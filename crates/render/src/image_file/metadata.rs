@@ -4,6 +4,7 @@ use crate::film::file::{FilmFileHeader, FilmReader, is_film_file};
 use crate::image_file::exr_reader::read_exr_meta;
 use exr::meta::attribute::AttributeValue;
 use png::Decoder;
+use png::text_metadata::ITXtChunk;
 use std::io::BufReader;
 use std::path::Path;
 use zerkalo_scene::disk::open_regular;
@@ -21,6 +22,15 @@ pub(super) fn padded(value: &str) -> String {
 /// Removes the padding of a metadata entry.
 fn unpadded((key, value): (String, String)) -> (String, String) {
     (key, value.trim_end_matches(' ').to_string())
+}
+
+/// Largest length of a compressed text in a PNG file that is read \[bytes\].
+const TEXT_BYTES: usize = 64 << 10;
+
+/// Returns the text of a chunk, or a note if it is too long or damaged.
+fn text_of(mut chunk: ITXtChunk) -> String {
+    let text = chunk.decompress_text_with_limit(TEXT_BYTES).and_then(|()| chunk.get_text());
+    text.unwrap_or_else(|_| "(longer than 64 KB, or damaged)".to_string())
 }
 
 /// Metadata of a picture file (PNG, OpenEXR) or film file.
@@ -52,6 +62,7 @@ impl FileMetadata {
         let shown = path.display();
         let file = open_regular(path).map_err(|error| format!("cannot read {shown}: {error}"))?;
         let mut decoder = Decoder::new(BufReader::new(file));
+        decoder.set_ignore_iccp_chunk(true);
         if let Ok(info) = decoder.read_header_info() {
             let (width, height) = info.size();
             let reader = decoder.read_info().map_err(|e| format!("cannot read {shown}: {e}"))?;
@@ -59,8 +70,7 @@ impl FileMetadata {
             let latin = info.uncompressed_latin1_text.iter();
             let latin = latin.map(|chunk| (chunk.keyword.clone(), chunk.text.clone()));
             let utf8 = info.utf8_text.iter();
-            let utf8 =
-                utf8.filter_map(|chunk| Some((chunk.keyword.clone(), chunk.get_text().ok()?)));
+            let utf8 = utf8.map(|chunk| (chunk.keyword.clone(), text_of(chunk.clone())));
             return Ok(Self {
                 format: "PNG",
                 size: [width as usize, height as usize],
@@ -87,5 +97,34 @@ impl FileMetadata {
     /// Returns the value of the entry `key`.
     pub fn get(&self, key: &str) -> Option<&str> {
         self.entries.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Checks a text of a few bytes, another one of 64 KiB, and a short chunk of a long text.
+    #[test]
+    fn long_texts_are_not_inflated() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let mut encoder = png::Encoder::new(std::fs::File::create(&path).unwrap(), 1, 1);
+        let texts = [3, TEXT_BYTES, TEXT_BYTES + 1, 50 << 20].map(|length| "x".repeat(length));
+        for (i, text) in texts[..3].iter().enumerate() {
+            encoder.add_itxt_chunk(i.to_string(), text.clone()).unwrap();
+        }
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&[0]).unwrap();
+        drop(writer);
+        // The encoder compresses no texts.
+        let entries = FileMetadata::read(&path).unwrap().entries;
+        assert_eq!(entries.into_iter().map(|(_, text)| text).collect::<Vec<_>>(), texts[..3]);
+        let note = "(longer than 64 KB, or damaged)";
+        for (text, shown) in texts.iter().zip([&*texts[0], &*texts[1], note, note]) {
+            let mut chunk = ITXtChunk::new("a", text.as_str());
+            chunk.compress_text().unwrap();
+            assert_eq!(text_of(chunk), shown);
+        }
     }
 }

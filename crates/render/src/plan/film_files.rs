@@ -4,7 +4,6 @@
 use crate::checkpoint::seconds_of;
 use crate::film::Film;
 use crate::film::file::{FilmFileHeader, FilmReader, SavedFilm};
-use crate::memory_budget;
 use crate::plan::merge::{SourcePart, join, without_plan};
 use crate::plan::part::{Part, PartShard, ranges};
 use crate::plan::{BASE, Plan, is_plan_file};
@@ -317,15 +316,6 @@ impl FilmFiles {
     }
 }
 
-/// Creates an empty film for `header`. Fails if there is not enough memory.
-fn empty(header: &FilmFileHeader) -> Result<SavedFilm, String> {
-    let (size, groups) = (header.film.size(), header.film.scales.len());
-    memory_budget::check(size, groups, 0)?;
-    let film = Film::try_new(header.film.clone(), None);
-    let film = film.map_err(|_| memory_budget::refused(size, groups))?;
-    Ok(SavedFilm { header: header.clone(), film })
-}
-
 impl Contents {
     fn read(path: &Path) -> Result<Self, String> {
         let reader = FilmReader::open(path).map_err(|error| error.to_string())?;
@@ -362,7 +352,10 @@ impl FilmFile {
         let reader = FilmReader::open(&self.path).map_err(|error| error.to_string())?;
         let SavedFilm { film, .. } = match sum {
             Some(sum) => sum,
-            None => sum.insert(empty(&reader.header)?),
+            None => {
+                let film = reader.header.empty_film(&self.path).map_err(|e| e.to_string())?;
+                sum.insert(SavedFilm { header: reader.header.clone(), film })
+            }
         };
         let before = film.samples();
         reader.add_to(film).map_err(|error| error.to_string())?;

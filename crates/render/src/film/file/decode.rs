@@ -109,7 +109,7 @@ impl<R: Read> FilmReader<R> {
 
     /// Reads header and film.
     pub fn read(self) -> Result<SavedFilm, FileError> {
-        let mut film = Film::new(self.header.film.clone());
+        let mut film = self.header.empty_film(&self.input.path)?;
         let header = self.add_to(&mut film)?;
         Ok(SavedFilm { header, film })
     }

@@ -37,10 +37,14 @@ mod tile_record;
 pub use decode::{Fields, FilmReader, is_film_file};
 pub use encode::{EncodedFilm, text};
 
+use crate::file_error::FileError;
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
 use crate::film::store::{Film, Header};
+use crate::memory_budget;
 use std::collections::BTreeMap;
+use std::path::Path;
+use zerkalo_scene::process_memory::missing_memory;
 
 /// First bytes of a film file.
 const MAGIC: [u8; 8] = *b"\x89ZKF\r\n\x1a\n";
@@ -81,6 +85,18 @@ pub struct SavedFilm {
 }
 
 impl FilmFileHeader {
+    /// Creates an empty film for the file at `path`. Fails if there is not enough memory.
+    pub fn empty_film(&self, path: &Path) -> Result<Film, FileError> {
+        let Header { width, height, scales, .. } = &self.film;
+        let (size, groups) = ([*width, *height].map(|n| n as u32), scales.len());
+        let film = match missing_memory(memory_budget::needed(size, groups)) {
+            Some(missing) => Err(format!("its film of {width} x {height} pixels {missing}")),
+            None => Film::try_new(self.film.clone(), None)
+                .map_err(|_| memory_budget::refused(size, groups)),
+        };
+        film.map_err(|what| FileError::new(path, what, "free some, or use a machine with more"))
+    }
+
     /// Returns the name of the scene file, if the metadata have it.
     pub fn source(&self) -> Option<&str> {
         self.metadata.iter().find(|(key, _)| key == "Source").map(|(_, source)| source.as_str())

@@ -166,3 +166,18 @@ fn claimed_size_is_compared_with_the_length_of_the_file() {
     let error = read(&file).unwrap_err().to_string();
     assert!(error.contains("its header has invalid values"), "{error}");
 }
+
+/// Checks that a film of two terabytes is refused before its tiles are read.
+#[test]
+#[cfg(target_os = "linux")]
+fn film_that_does_not_fit_is_refused() {
+    let film = film(1, 1, &[1.0, 1.0]);
+    let mut header = header_of(&film);
+    (header.film.width, header.film.height) = (1 << 17, 1 << 17);
+    let file = EncodedFilm::new(&header, &film, None).pieces.concat();
+    let reader = FilmReader::new(Path::new("a.zk"), Cursor::new(&file[..]), 1 << 40).unwrap();
+    let error = reader.read().unwrap_err();
+    assert!(error.what.starts_with("its film of 131072 x 131072 pixels needs 19"), "{error}");
+    assert!(error.what.contains(" are available"), "{error}");
+    assert_eq!(error.remedy, "free some, or use a machine with more");
+}
