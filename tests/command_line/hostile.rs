@@ -337,6 +337,29 @@ fn images_that_do_not_fit_together_are_refused() {
     }
 }
 
+/// Checks that pipes are not waited for. A scene may come from a pipe that a program writes to.
+#[test]
+#[cfg(unix)]
+fn pipes_without_a_writer_are_refused() {
+    let desk = Desk::new();
+    assert!(Command::new("mkfifo").arg(desk.path("pipe")).status().unwrap().success());
+    for (args, words) in [
+        (&["check", "pipe"][..], "the file holds no scene"),
+        (&["measure", "scene.toml", "--reference", "pipe"], "it is a pipe, not a regular file"),
+        (&["info", "pipe"], "it is a pipe, not a regular file"),
+        (&["render", "scene.toml", "-o", "a.png", "--resume", "pipe"], "it is a pipe"),
+    ] {
+        let run = desk.run(args);
+        assert_eq!(run.status, 1, "{args:?}");
+        assert!(run.err.contains(words), "{args:?}: {}", run.err);
+    }
+    let script = "cat scene.toml | \"$0\" check /dev/stdin";
+    let mut shell = Command::new("sh");
+    shell.args(["-c", script, env!("CARGO_BIN_EXE_zerkalo")]).current_dir(desk.0.path());
+    let run = Run::from(shell.output().unwrap());
+    assert_eq!(run.status, 0, "{}", run.err);
+}
+
 #[test]
 fn metadata_cannot_forge_lines() {
     let desk = Desk::new();

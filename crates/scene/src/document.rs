@@ -2,6 +2,7 @@
 
 use crate::asset::Assets;
 use crate::diagnostic::{Diagnostic, SceneErrors};
+use crate::disk::open_at_once;
 use crate::format::patch::rewrite;
 use crate::format::read::{SourceScene, read_text};
 use crate::{AssetResolver, Scene, TomlText};
@@ -36,7 +37,7 @@ impl Scene {
 impl Document {
     /// Reads and validates the scene file at `path`. Returns the same errors as [`Scene::read`].
     pub fn read(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
-        Self::read_opened(path, File::open(path), assets)
+        Self::read_opened(path, open_at_once(path), assets)
     }
 
     /// Reads a scene file like [`Document::read`], once it was opened as `file`.

@@ -6,7 +6,7 @@ mod owner;
 mod replace;
 mod stamp;
 
-pub(crate) use open::open_regular_with;
+pub(crate) use open::{open_at_once, open_regular_with};
 pub use open::{open_regular, require_regular};
 pub use owner::{is_own, user_name};
 pub use replace::{

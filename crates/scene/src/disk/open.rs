@@ -1,6 +1,6 @@
 //! Opening of regular files without blocking on pipes and devices.
 
-use rustix::fs::OFlags;
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use std::fs::{self, File, FileType, OpenOptions};
 use std::io::{self, ErrorKind};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
@@ -12,6 +12,18 @@ use std::path::Path;
 /// Fails if the file cannot be opened or is not a regular file.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     open_regular_with(File::options().read(true), path)
+}
+
+/// Opens the file at `path` for reading. A pipe that no program writes to is empty; opening it does
+/// not block. Reading blocks as usual.
+///
+/// # Errors
+/// Fails if the file cannot be opened.
+pub fn open_at_once(path: &Path) -> io::Result<File> {
+    let nonblocking = OFlags::NONBLOCK.bits() as i32;
+    let file = File::options().read(true).custom_flags(nonblocking).open(path)?;
+    fcntl_setfl(&file, fcntl_getfl(&file)? - OFlags::NONBLOCK)?;
+    Ok(file)
 }
 
 /// Opens the regular file at `path` with the access that `options` requests.
@@ -72,6 +84,9 @@ mod tests {
             assert_eq!(error.kind(), ErrorKind::InvalidInput);
             assert_eq!(error.to_string(), format!("it is {kind}, not a regular file"));
         }
+        let mut text = String::new();
+        open_at_once(&pipe).unwrap().read_to_string(&mut text).unwrap();
+        assert_eq!(text, "");
         let missing = open_regular(&folder.path().join("nowhere")).unwrap_err();
         assert_eq!(missing.kind(), ErrorKind::NotFound);
     }

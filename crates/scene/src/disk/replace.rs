@@ -78,7 +78,7 @@ impl Replacement {
         let target = match existing {
             Existing::Replace => follow(path).map_err(other_file)?,
             Existing::Refuse if path.symlink_metadata().is_ok() => return Err(exists(path)),
-            Existing::Refuse => path.to_path_buf(),
+            Existing::Refuse => follow(path).map_err(other_file)?,
         };
         let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty());
         let folder = parent.unwrap_or(Path::new(".")).to_path_buf();
@@ -192,7 +192,8 @@ fn is_stream(path: &Path) -> bool {
         || follow(path).is_err_and(|e| e.kind() == ErrorKind::Unsupported)
 }
 
-/// Returns the path to which `path` leads through symbolic links. There may be no file at it.
+/// Returns the path to which `path` leads through symbolic links, also those to directories. There
+/// may be no file at it.
 ///
 /// # Errors
 ///
@@ -200,29 +201,39 @@ fn is_stream(path: &Path) -> bool {
 /// [`ErrorKind::Unsupported`] for a link to an open file of a process. Fails also if a link cannot
 /// be read, or after [`MAX_LINKS`] links.
 fn follow(path: &Path) -> io::Result<PathBuf> {
-    let mut path = path.to_path_buf();
-    for _ in 0..MAX_LINKS {
-        let Some(link) = path.symlink_metadata().ok().filter(Metadata::is_symlink) else {
-            return Ok(path);
+    let reversed = |path: &Path| -> Vec<_> {
+        path.components().rev().map(|component| component.as_os_str().to_os_string()).collect()
+    };
+    let (mut followed, mut rest, mut links) = (PathBuf::new(), reversed(path), 0);
+    while let Some(component) = rest.pop() {
+        let next = followed.join(component);
+        let Some(link) = next.symlink_metadata().ok().filter(Metadata::is_symlink) else {
+            followed = next;
+            continue;
         };
-        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-        let folder = parent.unwrap_or(Path::new(".")).to_path_buf();
-        let directory = fs::metadata(&folder)?;
+        let folder = Some(&*followed).filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new("."));
+        let directory = fs::metadata(folder)?;
         let user = geteuid().as_raw();
         if !may_follow(link.uid(), directory.uid(), directory.mode(), user) {
             let why = format!(
-                "it is a symbolic link of user {} in a folder that everybody may write to",
+                "{} is a symbolic link of user {} in a folder that everybody may write to",
+                if rest.is_empty() { "it".into() } else { next.to_string_lossy() },
                 user_name(link.uid())
             );
             return Err(io::Error::new(ErrorKind::PermissionDenied, why));
         }
-        if fs::canonicalize(&folder)?.starts_with("/proc") {
+        if rest.is_empty() && fs::canonicalize(folder)?.starts_with("/proc") {
             let why = "it is an open file of a process";
             return Err(io::Error::new(ErrorKind::Unsupported, why));
         }
-        path = folder.join(fs::read_link(&path)?);
+        links += 1;
+        if links > MAX_LINKS {
+            return Err(io::Error::other("too many symbolic links lead to it"));
+        }
+        rest.extend(reversed(&fs::read_link(&next)?));
     }
-    Err(io::Error::other("too many symbolic links lead to it"))
+    Ok(followed)
 }
 
 /// Returns `true` if the user with the id `user` may write through a symbolic link with the owner
@@ -411,6 +422,24 @@ mod tests {
         let outer = folder.path().join("outer");
         symlink(&link, &outer).unwrap();
         assert!(message(write(&outer, b"new")).contains("symbolic link of user 4321"));
+        // So is a file in a directory that such a link leads to.
+        let [directory, linked] = [folder.path().join("directory"), shared.join("linked")];
+        fs::create_dir(&directory).unwrap();
+        symlink(&directory, &linked).unwrap();
+        for name in ["a/../b", "b"] {
+            fs::create_dir_all(directory.join("a")).unwrap();
+            write(&linked.join(name), b"mine").unwrap();
+        }
+        lchown(&linked, Some(4321), None).unwrap();
+        for existing in [Existing::Replace, Existing::Refuse] {
+            for name in ["b", "new"] {
+                let error = replace_file(&linked.join(name), existing, |_| Ok(())).unwrap_err();
+                let words = ["such a file already", "linked is a symbolic link of user 4321"];
+                let refused = usize::from(name == "new" || existing == Existing::Replace);
+                assert!(error.what.contains(words[refused]), "{error}");
+            }
+        }
+        assert_eq!(count(&directory), 2);
     }
 
     #[test]
