@@ -186,8 +186,9 @@ mod tests {
     use super::*;
     use exr::compression::Compression;
     use exr::image::{
-        AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image as Picture, Layer,
+        AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image as Picture, Layer, Levels,
     };
+    use exr::math::RoundingMode;
     use exr::meta::attribute::LineOrder;
     use exr::meta::header::{ImageAttributes, LayerAttributes};
     use exr::prelude::f16;
@@ -263,6 +264,34 @@ mod tests {
                         }
                     }
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn largest_level_and_unsigned_integers_are_decoded() {
+        let encoding = Encoding { blocks: Blocks::Tiles(Vec2(16, 9)), ..Encoding::SMALL_LOSSLESS };
+        let level = |number, level: usize| {
+            let [width, height] = [SIZE.0, SIZE.1].map(|n| (n >> level).max(1));
+            FlatSamples::F32(values(number).take(width * height).collect())
+        };
+        let channels = ["R", "G", "B"].into_iter().enumerate().map(|(i, name)| {
+            let level_data = (0..7).map(|n| level(i, n)).collect();
+            AnyChannel::new(name, Levels::Mip { rounding_mode: RoundingMode::Down, level_data })
+        });
+        let channels = AnyChannels::sort(channels.collect());
+        let mip = Layer::new(SIZE, LayerAttributes::default(), encoding, channels);
+        let mut bytes = Cursor::new(Vec::new());
+        Picture::from_layer(mip).write().to_buffered(&mut bytes).unwrap();
+        let mut whole = layer(&["R", "G", "B"], Encoding::SMALL_LOSSLESS);
+        for channel in &mut whole.channel_data.list {
+            let numbers = channel.sample_data.values_as_f32().map(|x| (4.0 * x) as u32).collect();
+            channel.sample_data = FlatSamples::U32(numbers);
+        }
+        for (bytes, factor) in [(bytes.into_inner(), 1.0), (bytes_of(vec![whole]), 4.0)] {
+            let pixels = read_pixels(bytes).unwrap();
+            for c in 0..3 {
+                assert!(values(c).zip(&pixels).all(|(x, pixel)| pixel[c] == factor * x), "{c}");
             }
         }
     }

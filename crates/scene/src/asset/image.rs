@@ -432,6 +432,110 @@ mod tests {
         }
     }
 
+    /// Component of a JPEG file: sampling factors and the value of all its samples.
+    type Component = ([u8; 2], u8);
+
+    /// Returns a JPEG file of 40 x 24 pixels of one colour. `adobe` is the transform of an Adobe
+    /// segment; `restart` is the number of units between restart markers, 0 for none.
+    fn flat_jpeg(components: &[Component], adobe: Option<u8>, restart: u8) -> Vec<u8> {
+        let mut bytes = vec![0xff, 0xd8];
+        let mut segment = |marker: u8, contents: &[u8]| {
+            bytes.extend([0xff, marker, 0, contents.len() as u8 + 2]);
+            bytes.extend(contents);
+        };
+        if let Some(transform) = adobe {
+            segment(0xee, &[&b"Adobe\0\x64\0\0\0\0"[..], &[transform]].concat());
+        }
+        // All divisors are 8, so that the mean of a block is stored as it is.
+        segment(0xdb, &[&[0], &[8; 64][..]].concat());
+        let ids = || (1..=components.len() as u8).zip(components);
+        let frame = ids().flat_map(|(id, ([h, v], _))| [id, h << 4 | v, 0]).collect::<Vec<_>>();
+        segment(0xc0, &[&[8, 0, 24, 0, 40, components.len() as u8], &frame[..]].concat());
+        // Means have the codes 0000 to 1011 for their numbers of bits, the end of a block has 0.
+        let means: Vec<u8> = (0..12).collect();
+        segment(
+            0xc4,
+            &[&[0, 0, 0, 0, 12, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], &means[..]].concat(),
+        );
+        segment(0xc4, &[0x10, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        segment(0xdd, &[0, restart]);
+        let scan = ids().flat_map(|(id, _)| [id, 0]).collect::<Vec<_>>();
+        segment(0xda, &[&[components.len() as u8], &scan[..], &[0, 63, 0]].concat());
+        // In a scan of one component, a unit is a block whatever the sampling factors are.
+        let is_single = components.len() == 1;
+        let blocks = |factors: &[u8; 2]| if is_single { [1; 2] } else { *factors };
+        let most = |axis: usize| components.iter().map(|(f, _)| blocks(f)[axis]).max().unwrap();
+        let units = 40u8.div_ceil(8 * most(0)) * 24u8.div_ceil(8 * most(1));
+        let mut bits = String::new();
+        for unit in 0..units {
+            let is_first = unit == 0 || restart > 0 && unit % restart == 0;
+            if is_first && unit > 0 {
+                bytes.extend(packed(&std::mem::take(&mut bits)));
+                bytes.extend([0xff, 0xd0 + (unit / restart - 1) % 8]);
+            }
+            for (factors, value) in components {
+                let mean = i32::from(*value) - 128;
+                let length = 32 - mean.unsigned_abs().leading_zeros();
+                let stored = if mean < 0 { mean + (1 << length) - 1 } else { mean };
+                let first = format!("{length:04b}{stored:0width$b}0", width = length as usize);
+                bits += if is_first { &first } else { "00000" };
+                let [h, v] = blocks(factors);
+                bits += &"00000".repeat(usize::from(h * v) - 1);
+            }
+        }
+        [bytes, packed(&bits), vec![0xff, 0xd9]].concat()
+    }
+
+    /// Packs bits into bytes, with ones at the end and a zero after each byte 0xff.
+    fn packed(bits: &str) -> Vec<u8> {
+        let padded = format!("{bits:1<width$}", width = bits.len().next_multiple_of(8));
+        let byte = |i| u8::from_str_radix(&padded[i..i + 8], 2).unwrap();
+        let bytes = (0..padded.len()).step_by(8).map(byte);
+        bytes.flat_map(|byte| if byte == 0xff { vec![0xff, 0] } else { vec![byte] }).collect()
+    }
+
+    /// Checks colour spaces and subsampling of JPEG, with and without restart markers.
+    #[test]
+    fn all_color_spaces_of_jpeg_are_decoded() {
+        const FULL: [u8; 2] = [1, 1];
+        let ycc = |factors| [(factors, 150), (FULL, 100), (FULL, 180)].to_vec();
+        // ITU-T T.871, equation 5.
+        let from_ycc = [222.9, 122.5, 100.4];
+        let rgb = vec![(FULL, 200), (FULL, 100), (FULL, 50)];
+        let with_black = |mut components: Vec<Component>| {
+            components.push((FULL, 128));
+            components
+        };
+        for (components, adobe, expected) in [
+            (vec![(FULL, 77)], None, [77.0; 3]),
+            (vec![([2, 2], 77)], None, [77.0; 3]),
+            (ycc(FULL), None, from_ycc),
+            (ycc([2, 1]), None, from_ycc),
+            (ycc([1, 2]), None, from_ycc),
+            (ycc([2, 2]), None, from_ycc),
+            (ycc([4, 1]), None, from_ycc),
+            (ycc(FULL), Some(1), from_ycc),
+            (rgb.clone(), Some(0), [200.0, 100.0, 50.0]),
+            // Adobe stores 255 less the ink.
+            (with_black(rgb), Some(0), [100.4, 50.2, 25.1]),
+            (with_black(ycc(FULL)), Some(2), from_ycc.map(|x| (255.0 - x) * 128.0 / 255.0)),
+        ] {
+            for restart in [0, 1, 2] {
+                let case = format!("{components:?} {adobe:?} {restart}");
+                let source = file(flat_jpeg(&components, adobe, restart));
+                let image = Image::parse(&source).expect(&case);
+                let channels = if components.len() == 1 { 1 } else { 3 };
+                assert_eq!((image.size(), image.channels), ([40, 24], channels), "{case}");
+                assert_eq!(Image::memory(&source).unwrap().kept, 40 * 24 * channels as u64);
+                for (i, value) in values(&image).into_iter().enumerate() {
+                    let expected = expected[i % channels];
+                    assert!((f64::from(value) - expected).abs() < 2.0, "{case}: {i} {value}");
+                }
+                assert_eq!(image.notes, [] as [String; 0], "{case}");
+            }
+        }
+    }
+
     #[test]
     fn images_become_upright() {
         // Orientation 6: the first row is the right column, from above.
