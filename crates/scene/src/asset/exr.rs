@@ -127,7 +127,8 @@ type Set = (usize, String, Channels);
 /// picture; otherwise Y in the same way. Case has no influence. Fails with a clause about the channels
 /// that were found.
 fn choose(headers: &[Header]) -> Result<(usize, Channels), String> {
-    let (mut colors, mut greys, mut all) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut colors, mut greys) = (Vec::new(), Vec::new());
+    let (mut others, mut all) = (Vec::new(), Vec::new());
     for (layer, header) in headers.iter().enumerate().filter(|(_, header)| !header.deep) {
         let mut names = BTreeMap::new();
         for channel in &header.channels.list {
@@ -143,7 +144,9 @@ fn choose(headers: &[Header]) -> Result<(usize, Channels), String> {
                     let channels = Channels::Colors([text, green, blue].map(|t| Text::clone(t)));
                     colors.push((layer, prefix.to_string(), channels));
                 }
-                ("y", ..) if is_alone() => {
+                // The decoder takes the first layer that has a channel of this name.
+                ("y", ..) if !is_alone() => others.push(*text),
+                ("y", ..) if !others.contains(text) => {
                     greys.push((layer, prefix.to_string(), Channels::Grey(Text::clone(text))));
                 }
                 _ => {}
@@ -313,6 +316,7 @@ mod tests {
             (&[&["a.r", "a.g", "a.b", "R", "G", "B"]], Ok([3, 4, 5])),
             (&[&["X", "Y", "Z"], &["R", "G", "B"]], Ok([0, 1, 2])),
             (&[&["Z"], &["l.Y"]], Ok([0, 0, 0])),
+            (&[&["X", "Y", "Z"], &["Y"]], Err("no layer has the channels R, G and B")),
             (&[&["X", "Y", "Z"]], Err("no layer has the channels R, G and B")),
             (&[&["Y", "RY", "BY"]], Err("without deep data: by, ry, y")),
             (&[&["R", "G"]], Err("without deep data: g, r")),

@@ -273,9 +273,29 @@ fn jpeg_header(source: &FileContents) -> Result<JpegHeader<'_>, AssetError> {
     Ok(JpegHeader { decoder, size, color })
 }
 
+/// Returns the position of the first scan of a JPEG file. Thumbnails in segments before it are skipped.
+fn first_scan(bytes: &[u8]) -> Option<usize> {
+    let mut at = 2;
+    loop {
+        at += match *bytes.get(at..)?.first_chunk::<4>()? {
+            [0xff, 0xda, _, _] => return Some(at),
+            [0xff, 0..=0xfe, high, low] => 2 + usize::from(u16::from_be_bytes([high, low])),
+            [_, _, _, _] => 1,
+        };
+    }
+}
+
 /// Decodes a JPEG file.
 fn decode_jpeg(source: &FileContents) -> Result<Image, AssetError> {
-    let JpegHeader { mut decoder, size: [width, height], color } = jpeg_header(source)?;
+    // The decoder takes bytes that are missing for zeros, which are data. No Huffman code consists of
+    // ones alone (ITU T.81, annex C): ones before the end make missing data an error.
+    let scan = first_scan(&source.bytes).unwrap_or(source.bytes.len());
+    let end = source.bytes[scan..].windows(2).position(|pair| pair == [0xff, 0xd9]);
+    let end = end.map(|end| scan + end);
+    let (data, rest) = source.bytes.split_at(end.unwrap_or(source.bytes.len()));
+    let bytes = [data, &[0xff, 0].repeat(16), rest].concat();
+    let padded = FileContents { path: source.path.clone(), bytes };
+    let JpegHeader { mut decoder, size: [width, height], color } = jpeg_header(&padded)?;
     let levels = decoder.decode().map_err(|error| decode_error(source, "JPEG", error))?;
     let image = match color.has_color() {
         false => GrayImage::from_raw(width, height, levels).map(DynamicImage::from),
@@ -283,10 +303,7 @@ fn decode_jpeg(source: &FileContents) -> Result<Image, AssetError> {
     };
     let image = image.ok_or_else(|| decode_error(source, "JPEG", "pixels are missing"))?;
     let mut image = Image::upright(image, decoder.exif().map(Vec::as_slice));
-    // The decoder takes bytes that are missing for zeros. Where a download was cut off, the end of
-    // the image is missing after the start of the last scan.
-    let last = |marker: [u8; 2]| source.bytes.windows(2).rposition(|pair| pair == marker);
-    if last([0xff, 0xd9]) < last([0xff, 0xda]) {
+    if end.is_none() {
         image.notes.push("the file has no end: the lower part of the image may be damaged".into());
     }
     Ok(image)
@@ -558,8 +575,8 @@ mod tests {
         assert_eq!(rotated.color(0, 7), upright.color(7, 39));
     }
 
-    /// Checks JPEG files that are cut off after the header, with and without zeros in place of the
-    /// rest.
+    /// Checks JPEG files that are cut off after the header, with nothing, with zeros, and with an end
+    /// in place of the rest.
     #[test]
     fn damaged_jpeg_is_noticed() {
         for bytes in JPEGS {
@@ -569,13 +586,16 @@ mod tests {
             for kept in (start + 2..bytes.len() - 2).chain([20, bytes.len() / 4]) {
                 let part = bytes[..kept].to_vec();
                 let zeros = [&part, &vec![0; bytes.len() - kept][..]].concat();
-                for damaged in [part, zeros] {
+                // The last bytes may be completed by ones. A progressive image is refined by them.
+                let is_cut = bytes.len() - kept > 8 && !bytes.windows(2).any(|p| p == [0xff, 0xc2]);
+                let ended = is_cut.then(|| [&part[..], &[0xff, 0xd9]].concat());
+                for damaged in [part, zeros].into_iter().chain(ended) {
                     let image = Image::parse(&file(damaged));
                     let is_accepted = image.is_ok_and(|image| image.notes.is_empty());
                     assert!(!is_accepted, "{kept} bytes of {}", bytes.len());
                 }
             }
-            let trailing = [bytes, b"trailing bytes"].concat();
+            let trailing = [bytes, b"trailing bytes \xff\xda, as of a film"].concat();
             assert_eq!(Image::parse(&file(trailing)), Ok(whole));
         }
     }

@@ -33,7 +33,7 @@ const MESH_BYTES: u64 = 2;
 const START_BYTES: [u64; 2] = [1 << 18, 1 << 26];
 
 /// Returns the memory of the asset in the file at `path` of `length` bytes: after decoding, and the
-/// further memory during decoding; zero if the header cannot be read.
+/// further memory during decoding, with up to two copies of the file; zero if the header cannot be read.
 pub fn asset_memory(kind: AssetKind, path: &Path, length: u64) -> [u64; 2] {
     let memory = |start: &FileContents| match kind {
         AssetKind::Mesh => {
@@ -46,5 +46,5 @@ pub fn asset_memory(kind: AssetKind, path: &Path, length: u64) -> [u64; 2] {
     let found = START_BYTES
         .into_iter()
         .find_map(|bytes| memory(&FileContents::read_start(path, bytes).ok()?).ok());
-    found.map_or([0; 2], |memory| [memory.kept, memory.decoding.saturating_add(length)])
+    found.map_or([0; 2], |memory| [memory.kept, memory.decoding.saturating_add(2 * length)])
 }
