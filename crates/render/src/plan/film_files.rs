@@ -2,8 +2,7 @@
 //! After a change of a file, all films are added again, which takes the memory of one film only.
 
 use crate::checkpoint::seconds_of;
-use crate::film::Film;
-use crate::film::file::{FilmFileHeader, FilmReader, SavedFilm};
+use crate::film::file::{FilmReader, SavedFilm};
 use crate::plan::merge::{SourcePart, join, without_plan};
 use crate::plan::part::{Part, PartShard, ranges};
 use crate::plan::{BASE, Plan, is_plan_file};
