@@ -16,10 +16,10 @@ read -ra options <<< "${RENDER_OPTIONS:-}"
 parts="${plan%.plan}"
 shards="$(sed -n 's/^shards //p' "$plan")"
 
-# `--retries` counts all attempts. `--halt soon,fail=1` gives up when a shard has failed that often.
-seq "$shards" | parallel --sshloginfile "$hosts" --jobs "${JOBS_PER_HOST:-1}" --retries 5 --halt soon,fail=1 \
-    --joblog "$parts.joblog" \
-    "$zerkalo" render "$scene" --plan "$plan" --shard {} -o "$parts-{}.zk" \
-    "${options[@]}"
+# Paths are inputs of GNU parallel, which quotes them for the shells of the hosts. `--retries` counts all attempts.
+# `--halt soon,fail=1` gives up when a shard has failed that often.
+parallel --sshloginfile "$hosts" --jobs "${JOBS_PER_HOST:-1}" --retries 5 --halt soon,fail=1 --joblog "$parts.joblog" \
+    exec {1} render {2} --plan {3} --shard {4} -o {5}-{4}.zk "${options[@]}" \
+    ::: "$zerkalo" ::: "$scene" ::: "$plan" :::: <(seq "$shards") ::: "$parts"
 
-"$zerkalo" merge "$parts"-*.zk -o "$output"
+"$zerkalo" merge "$plan" -o "$output"

@@ -18,8 +18,8 @@ use zerkalo_world::Precision;
 #[command(version, about, args_conflicts_with_subcommands = true)]
 #[command(
     after_help = "Without a command the dashboard opens: edit the scene, watch it converge.\n\n\
-                        Exit status: 0 done, 1 failed, 2 wrong usage, 129, 130, 131 or 143 stopped \
-                        by a signal (`render` then writes the picture so far)."
+                        Exit status: 0 done, 1 failed, 2 wrong usage, 128 plus the number of a \
+                        signal that stopped it (`render` then writes the picture so far)."
 )]
 pub struct Cli {
     #[command(subcommand)]

@@ -1,17 +1,19 @@
 //! Checkpoints of `zerkalo render`: written at intervals, on signals and at the end.
 
-use crate::command::{Failure, warn};
+use crate::command::{Failure, save, warn};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use zerkalo_render::export::Provenance;
 use zerkalo_render::film::file::is_film_file;
 use zerkalo_render::session::Session;
-use zerkalo_scene::disk::{Existing, WriteError, check_writable};
+use zerkalo_scene::disk::{Claim, Existing, WriteError, check_writable};
 
 /// Writer of checkpoints at intervals. Rendering pauses only while a checkpoint is encoded.
 pub struct CheckpointWriter {
     path: PathBuf,
+    claim: Arc<Mutex<Claim>>,
     interval: Duration,
     provenance: Provenance,
     due: Instant,
@@ -20,10 +22,12 @@ pub struct CheckpointWriter {
 }
 
 impl CheckpointWriter {
-    /// Creates a writer to the file at `path`. The first checkpoint is due after `interval`.
-    pub fn new(path: &Path, interval: Duration, provenance: Provenance) -> Self {
+    /// Creates a writer to the file at `path`, which it has claimed. The first checkpoint is due
+    /// after `interval`.
+    pub fn new(path: &Path, claim: Claim, interval: Duration, provenance: Provenance) -> Self {
         let due = Instant::now() + interval;
-        Self { path: path.to_path_buf(), interval, provenance, due, written: None }
+        let claim = Arc::new(Mutex::new(claim));
+        Self { path: path.to_path_buf(), claim, interval, provenance, due, written: None }
     }
 
     /// Checks that a render may write checkpoints to `path`, or continue the checkpoint `resume`.
@@ -62,12 +66,15 @@ impl CheckpointWriter {
     /// Requests a checkpoint, written by a thread of its own. Returns the channel for its result.
     fn request(&self, session: &Session) -> Receiver<Result<(), WriteError>> {
         let (sender, written) = channel();
-        let path = self.path.clone();
+        let claim = Arc::clone(&self.claim);
         let provenance = self.provenance.clone();
         session.submit(move |picture| {
             let checkpoint = picture.and_then(|picture| picture.checkpoint(&provenance));
             std::thread::spawn(move || {
-                let written = checkpoint.map_or(Ok(()), |it| it.write(&path, Existing::Replace));
+                let mut claim = claim.lock().unwrap_or_else(PoisonError::into_inner);
+                let written = checkpoint.map_or(Ok(()), |checkpoint| {
+                    claim.replace(|path| checkpoint.write(path, Existing::Replace))
+                });
                 // The receiver has been dropped if the render has failed.
                 let _ = sender.send(written);
             });
@@ -75,10 +82,10 @@ impl CheckpointWriter {
         written
     }
 
-    /// Writes the last checkpoint.
+    /// Writes the last checkpoint, again and again if that fails.
     pub fn finish(self, session: &Session) -> Result<(), WriteError> {
         // An earlier checkpoint must not replace the last one.
         self.written.as_ref().map(Receiver::recv);
-        self.request(session).recv().unwrap_or(Ok(()))
+        save::persist(|| self.request(session).recv().unwrap_or(Ok(())))
     }
 }

@@ -2,17 +2,28 @@
 
 use crate::command::args::MergeArgs;
 use crate::command::part_file::{self, FilmOutput};
-use crate::command::{Failure, print_line};
+use crate::command::{Failure, on_signal, print_line, save};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use zerkalo_render::export::update_metadata;
 use zerkalo_render::plan::Merged;
 use zerkalo_render::session::Report;
 
 pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let output = FilmOutput::new(&args.output, args.bits)?;
+    // A signal ends the command at once, but a write that has begun is finished.
+    let is_writing = Arc::new(AtomicBool::new(false));
+    let writes = Arc::clone(&is_writing);
+    on_signal(move |status| {
+        if !writes.load(Ordering::Acquire) {
+            std::process::exit(status.into());
+        }
+    })?;
     let mut merged = Merged::of_files(&args.parts, args.partial)?;
     let report = Report::of_film(&merged.film, &merged.header.weights, &merged.header.display);
     update_metadata(&mut merged.header, &report);
-    output.write(&merged.film, &merged.header)?;
+    is_writing.store(true, Ordering::Release);
+    save::persist(|| output.write(&merged.film, &merged.header))?;
     let plan = &merged.part.plan;
     let path = args.output.display();
     print_line(&format!("{path}  {}  {} rays", part_file::summary(&report), merged.part.rays))?;

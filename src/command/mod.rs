@@ -16,6 +16,7 @@ mod plan;
 mod progress;
 mod regions;
 mod render;
+mod save;
 mod shard;
 mod stats;
 mod watch;
@@ -31,14 +32,18 @@ use std::fmt::Display;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{Document, Scene};
-use zerkalo_terminal::Signals;
+use zerkalo_terminal::{INTERRUPTED, SignalQueue, Signals, is_in_foreground};
 use zerkalo_world::{self as world, Precision, requires_double};
 
 /// Exit status for an invalid command line, also that of clap.
 const WRONG_USAGE: u8 = 2;
+
+/// Time after the first signal from which on Ctrl-C counts as pressed again: a program between the
+/// terminal and this one may pass the signal of one key on a second time.
+const SECOND_KEY: Duration = Duration::from_millis(300);
 
 /// Reason why a command did not succeed.
 enum Failure {
@@ -46,8 +51,8 @@ enum Failure {
     Failed(String),
     /// Invalid command line with this message (exit status 2).
     Usage(String),
-    /// Signal, after the picture or the edits were saved; the value is the exit status: 129, 130,
-    /// 131 or 143.
+    /// Signal, after the picture or the edits were saved; the value is the exit status: 128 plus the
+    /// number of the signal.
     Signalled(u8),
 }
 
@@ -118,9 +123,27 @@ fn end(error: &clap::Error) -> ! {
     std::process::exit(if failed { 1 } else { error.exit_code() })
 }
 
-/// Handles SIGINT and SIGTERM as [`Signals::catch_end`] does.
+/// Handles the signals that end a render: the first lets the command save its results. Repetitions
+/// have no effect, because batch systems send a signal twice or every few seconds. Only a second
+/// Ctrl-C in a terminal ends the program at once.
 fn handle_signals() -> Result<Signals, Failure> {
-    Signals::catch_end().map_err(|error| Failure::Failed(format!("no signals: {error}")))
+    let mut first = None;
+    on_signal(move |status| {
+        let is_key = status == INTERRUPTED && is_in_foreground();
+        let first = first.get_or_insert_with(Instant::now);
+        if is_key && first.elapsed() >= SECOND_KEY {
+            warn("ended at once; what was not written is lost");
+            std::process::exit(status.into());
+        } else if is_key {
+            warn("saving the results; Ctrl-C again ends at once");
+        }
+    })
+}
+
+/// Calls `on_end` with the exit status for each signal that asks the program to end.
+fn on_signal(on_end: impl FnMut(u8) + Send + 'static) -> Result<Signals, Failure> {
+    let signals = SignalQueue::of_batch_job().and_then(|queue| queue.handle(on_end));
+    signals.map_err(|error| Failure::Failed(format!("no signals: {error}")))
 }
 
 /// Prints a line on stderr. Errors of writing are ignored.

@@ -5,7 +5,7 @@ use crate::command::checkpoints::CheckpointWriter;
 use crate::command::progress::{Progress, counts, noise};
 use crate::command::regions::Division;
 use crate::command::{
-    Failure, handle_signals, print_line, read_scene, shard, stats, warn, warn_of_precision,
+    Failure, handle_signals, print_line, read_scene, save, shard, stats, warn, warn_of_precision,
 };
 use std::io;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo_render::session::{Report, Session, State};
 use zerkalo_render::{Checkpoint, Options, RegionRender};
 use zerkalo_scene::Scene;
-use zerkalo_scene::disk::{self, WriteError, check_writable};
+use zerkalo_scene::disk::{self, Claim, WriteError, check_writable};
 use zerkalo_terminal::Signals;
 
 /// Default noise target: half a quantisation step of an 8-bit file.
@@ -43,6 +43,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     // Faulty paths are reported before the render starts.
     check_outputs(args, &output)?;
+    let claim = args.checkpoint.as_deref().map(save::claim).transpose()?;
     let checkpoint = read_checkpoint(args)?;
     for warning in warnings {
         warn(&format!("warning: {warning}"));
@@ -65,7 +66,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let job = Job { args, scene, options, output: &output, provenance, signals, started };
     let rendered = match division.filter(|division| division.regions.count > 1) {
         Some(division) => in_regions(job, division.regions.rows)?,
-        None => as_a_whole(job, checkpoint)?,
+        None => as_a_whole(job, claim, checkpoint)?,
     };
     let end = rendered.end;
     let printed = print_line(&summary(&output.path, size, &rendered.report, end));
@@ -106,8 +107,13 @@ pub struct Rendered {
     kept: Result<(), WriteError>,
 }
 
-/// Renders a picture whose film fits into memory.
-fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Failure> {
+/// Renders a picture whose film fits into memory, from `checkpoint` on. Writes checkpoints to the
+/// file of `claim`.
+fn as_a_whole(
+    job: Job,
+    claim: Option<Claim>,
+    checkpoint: Option<Checkpoint>,
+) -> Result<Rendered, Failure> {
     let Job { args, scene, options, output, provenance, signals, started } = job;
     let threads = args.compute.threads();
     let mut session = Session::new(threads, options, schedule_settings(args))?;
@@ -116,24 +122,27 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
         None => drop(session.set_scene(Arc::new(scene))),
     }
     let set_after = started.elapsed();
-    let mut checkpoints = args.checkpoint.as_ref().map(|path| {
+    let mut checkpoints = args.checkpoint.as_ref().zip(claim).map(|(path, claim)| {
         let interval = Duration::from_secs_f64(args.checkpoint_interval.min(1e9));
-        CheckpointWriter::new(path, interval, provenance.clone())
+        CheckpointWriter::new(path, claim, interval, provenance.clone())
     });
     let end = watch(&session, &signals, checkpoints.as_mut())?;
     // The checkpoint comes first: the picture can be written again from its samples, if the program
     // is killed soon after a signal. Its error is returned after the picture has been written.
     let kept = checkpoints.map_or(Ok(()), |checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
-    let (depth, output) = (args.bits, output.clone());
-    let results = session.with(move |state, report| {
-        let header = film_header(state, report, &provenance);
-        let written = output.write(&header, depth, &mut &state.film);
-        let world = state.world.info();
-        (report.clone(), world.precision, world.biases.clone(), written)
+    let results = save::persist(|| {
+        let (depth, output, provenance) = (args.bits, output.clone(), provenance.clone());
+        let results = session.with(move |state, report| {
+            let header = film_header(state, report, &provenance);
+            let world = state.world.info();
+            output
+                .write(&header, depth, &mut &state.film)
+                .map(|()| (report.clone(), world.precision, world.biases.clone()))
+        });
+        results.transpose()
     });
-    let (report, precision, biased, written) = results.ok_or("the renderer has no picture")?;
-    written?;
+    let (report, precision, biased) = results?.ok_or("the renderer has no picture")?;
     let write_seconds = writing.elapsed().as_secs_f64();
     Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept })
 }

@@ -6,7 +6,7 @@
 use crate::command::args::RenderArgs;
 use crate::command::part_file::{self, FilmOutput};
 use crate::command::progress::Progress;
-use crate::command::{Failure, handle_signals, print_line, read_scene, warn};
+use crate::command::{Failure, handle_signals, print_line, read_scene, save, warn};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -15,7 +15,6 @@ use zerkalo_render::export::scene_hash;
 use zerkalo_render::film::Film;
 use zerkalo_render::film::file::FilmReader;
 use zerkalo_render::plan::{BASE, Part, PartShard, Plan, ShardRender};
-use zerkalo_render::session::Report;
 use zerkalo_render::{FileError, Options, RenderState};
 use zerkalo_scene::Document;
 use zerkalo_scene::disk::WriteError;
@@ -53,6 +52,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     }
     let complete = numbers.iter().map(|number| PartShard { number: *number, complete: true });
     let mut part = Part { plan: Arc::new(plan), shards: complete.collect(), rays: 0 };
+    let mut claim = save::claim(&args.output)?;
     let saved = match args.shard {
         Some(_) => saved(&args.output, &part)?,
         None => None,
@@ -62,9 +62,18 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     }
     let signals = handle_signals()?;
     let mut render = start(args, &document, &part, saved)?;
-    let signal = trace(&mut render, &mut part, &output, &signals)?;
+    let mut write = |render: &ShardRender, complete| {
+        part.shards.iter_mut().for_each(|shard| shard.complete = complete);
+        part.rays = render.rays;
+        claim.replace(|_| part_file::write(&output, &render.state, &part))
+    };
+    let mut checkpoint = |render: &ShardRender| match output {
+        FilmOutput::Film(_) => write(render, false).map(drop),
+        FilmOutput::Picture(..) => Ok(()),
+    };
+    let signal = trace(&mut render, &signals, &mut checkpoint);
     let unfinished = signal.is_some() && render.progress() < 1.0;
-    let report = write(&render, &mut part, &output, !unfinished)?;
+    let report = save::persist(|| write(&render, !unfinished))?;
     let share = match unfinished {
         true => {
             format!("  {:.0} % of the samples (stopped by a signal)", 100.0 * render.progress())
@@ -182,46 +191,32 @@ fn start(
     Ok(ShardRender::new(state, &ranges, rays, threads)?)
 }
 
-/// Traces samples until the shards of `part` are complete or a signal arrives. Returns the exit
-/// status of the signal, or `None` without a signal. Writes checkpoints to `output` if it is a film
-/// file.
+/// Traces samples until the shards are complete or a signal arrives. Returns the exit status of the
+/// signal, or `None` without a signal. Calls `write_checkpoint` at intervals.
 fn trace(
     render: &mut ShardRender,
-    part: &mut Part,
-    output: &FilmOutput,
     signals: &Signals,
-) -> Result<Option<u8>, Failure> {
+    write_checkpoint: &mut dyn FnMut(&ShardRender) -> Result<(), WriteError>,
+) -> Option<u8> {
     let mut progress = Progress::on_stderr();
     let mut interval = FIRST_CHECKPOINT;
     let mut written = Instant::now();
+    let mut signal = None;
     while render.step() {
-        if let Some(status) = signals.caught() {
-            progress.finish();
-            return Ok(Some(status));
+        signal = signals.caught();
+        if signal.is_some() {
+            break;
         }
         progress.show(&render.report());
-        if let FilmOutput::Film(_) = output
-            && written.elapsed() >= interval
-        {
+        if written.elapsed() >= interval {
             let start = Instant::now();
-            write(render, part, output, false)?;
+            // The next checkpoint may succeed.
+            write_checkpoint(render).unwrap_or_else(|error| warn(&format!("warning: {error}")));
             interval =
                 (2 * interval).min(LONGEST_INTERVAL).max(WRITES_PER_INTERVAL * start.elapsed());
             written = Instant::now();
         }
     }
     progress.finish();
-    Ok(None)
-}
-
-/// Writes the film so far, with its shards marked as `complete` or not. Returns the report on it.
-fn write(
-    render: &ShardRender,
-    part: &mut Part,
-    output: &FilmOutput,
-    complete: bool,
-) -> Result<Report, WriteError> {
-    part.shards.iter_mut().for_each(|shard| shard.complete = complete);
-    part.rays = render.rays;
-    part_file::write(output, &render.state, part)
+    signal
 }

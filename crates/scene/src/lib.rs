@@ -38,7 +38,7 @@ pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};
 pub use history::History;
 pub use object::Object;
-pub use recovery::{Orphan, Recovery, RecoveryFile, remove_stale, state_folder};
+pub use recovery::{Orphan, Recovery, RecoveryFile, state_folder};
 pub use settings::{
     Acceleration, Ambient, Background, BelowHorizon, FilmSettings, Filter, IntegratorSettings,
     RayTypes,

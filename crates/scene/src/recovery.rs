@@ -14,7 +14,7 @@ use std::fs::{self, DirBuilder, File, Metadata, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 use tempfile::NamedTempFile;
 
 /// Largest number of recovery files of one scene in one folder.
@@ -23,8 +23,6 @@ const MAX_FILES: u32 = 9;
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
 /// Word in place of the fingerprint, if the scene has no file.
 const NO_FILE: &str = "none";
-/// Age from which an unlocked temporary file is taken for one of a killed process and removed.
-const STALE_AFTER: Duration = Duration::from_secs(60);
 
 /// Writer and finder of the recovery files of one scene.
 #[derive(Debug)]
@@ -312,23 +310,4 @@ fn read(kept: Saved) -> io::Result<Orphan> {
         None => (None, text),
     };
     Ok(Orphan { kept, text, base, written })
-}
-
-/// Removes the incomplete temporary files of killed processes in `folder`.
-pub fn remove_stale(folder: &Path) {
-    let [prefix, suffix] = TEMPORARY;
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        let is_ours = name.starts_with(prefix) && name.ends_with(suffix);
-        let Some(metadata) = entry.metadata().ok().filter(|m| is_ours && m.is_file()) else {
-            continue;
-        };
-        let age = metadata.modified().ok().and_then(|written| written.elapsed().ok());
-        if age.is_some_and(|age| age >= STALE_AFTER)
-            && open(&entry.path()).is_ok_and(|file| file.try_lock().is_ok())
-        {
-            let _ = fs::remove_file(entry.path());
-        }
-    }
 }

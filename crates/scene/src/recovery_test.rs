@@ -2,7 +2,8 @@
 //! in one process behave like two processes, because a lock belongs to an open file and not to the
 //! process.
 
-use crate::{Recovery, RecoveryFile, remove_stale, state_folder};
+use crate::disk::remove_stale;
+use crate::{Recovery, RecoveryFile, state_folder};
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};

@@ -38,7 +38,9 @@ pub use clipboard::copied;
 pub use decode::Decoder;
 pub use input_reader::{InputReader, TimedEvent};
 pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};
-pub use signals::{HUNG_UP, SignalEvent, SignalQueue, Signals};
+pub use signals::{
+    HUNG_UP, INTERRUPTED, SignalEvent, SignalQueue, Signals, is_in_foreground,
+};
 
 /// Event that was decoded from terminal input.
 #[derive(Clone, Debug, PartialEq)]

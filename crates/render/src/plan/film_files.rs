@@ -95,13 +95,7 @@ impl FilmFiles {
     /// be used, or if the films of two files cannot be added.
     pub fn open(paths: &[PathBuf]) -> Result<Self, String> {
         let mut films = Self::default();
-        for path in paths {
-            if is_plan_file(path) {
-                films.name_plan(path)?;
-            } else {
-                films.files.push(FilmFile::new(path.clone(), None));
-            }
-        }
+        films.name(paths)?;
         let changed = films.read_changed();
         if let Some(reason) = films.accept(&changed) {
             return Err(reason);
@@ -110,18 +104,32 @@ impl FilmFiles {
         Ok(films)
     }
 
-    /// Reads the headers of the parts at `paths`. Fails if one cannot be used, or if two films
-    /// cannot be added.
+    /// Reads the headers of the parts at `paths`. A plan file stands for the film files of its
+    /// shards that exist. Fails if a file cannot be used, or if two films cannot be added.
     pub(super) fn of_parts(paths: &[PathBuf]) -> Result<Self, String> {
         let mut films = Self::default();
-        for path in paths {
-            let contents = Contents::read(path)?;
-            if let Contents::Checkpoint(_) = contents {
-                return Err(without_plan(path));
+        films.name(paths)?;
+        for file in &mut films.files {
+            if file.shard.is_none() || file.path.exists() {
+                file.contents = Contents::read(&file.path)?;
+                if let Contents::Checkpoint(_) = file.contents {
+                    return Err(without_plan(&file.path));
+                }
             }
-            films.files.push(FilmFile { contents, ..FilmFile::new(path.clone(), None) });
         }
         films.try_join().map(|()| films)
+    }
+
+    /// Adds the files at `paths`, and those of the plan among them.
+    fn name(&mut self, paths: &[PathBuf]) -> Result<(), String> {
+        for path in paths {
+            if is_plan_file(path) {
+                self.name_plan(path)?;
+            } else {
+                self.files.push(FilmFile::new(path.clone(), None));
+            }
+        }
+        Ok(())
     }
 
     /// Adds the film files of the plan at `path`. Fails if another plan was named before.

@@ -1,16 +1,19 @@
 //! Replacement of files in one step: a failure leaves the old file unchanged.
 
-use crate::disk::{require_regular, user_name};
+use crate::disk::{open_regular_with, require_regular, user_name};
 use rustix::process::geteuid;
 use std::fmt;
 use std::fs::{self, File, Metadata, Permissions};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use tempfile::NamedTempFile;
 
 /// Prefix and suffix of the names of the program's temporary files.
 pub const TEMPORARY: [&str; 2] = [".zerkalo-", ".tmp"];
+/// Age from which an unlocked temporary file is taken for one of a killed process and removed.
+const STALE_AFTER: Duration = Duration::from_secs(10);
 /// Largest number of symbolic links that are followed, as in Linux.
 const MAX_LINKS: usize = 40;
 
@@ -95,6 +98,7 @@ impl Replacement {
                 return Err(error(ErrorKind::PermissionDenied, what, remedy));
             }
         }
+        remove_stale(&folder);
         let mut builder = tempfile::Builder::new();
         // An existing file keeps its permissions. A new file gets those that the umask allows.
         builder.prefix(TEMPORARY[0]).suffix(TEMPORARY[1]);
@@ -145,6 +149,29 @@ impl Replacement {
 /// Locks a temporary file until it is closed. Other processes remove only files that they can lock.
 pub fn lock(temporary: &NamedTempFile) {
     let _ = temporary.as_file().try_lock();
+}
+
+/// Removes the temporary files that killed processes have left in `folder`.
+pub fn remove_stale(folder: &Path) {
+    let [prefix, suffix] = TEMPORARY;
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let is_ours = name.starts_with(prefix) && name.ends_with(suffix);
+        let Some(metadata) = entry.metadata().ok().filter(|m| is_ours && m.is_file()) else {
+            continue;
+        };
+        let age = metadata.modified().ok().and_then(|written| written.elapsed().ok());
+        // Some file systems lock only files that are open for writing.
+        let mut writable = File::options();
+        writable.read(true).write(true);
+        if age.is_some_and(|age| age >= STALE_AFTER)
+            && open_regular_with(&mut writable, &entry.path())
+                .is_ok_and(|file| file.try_lock().is_ok())
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Replaces the content of the file at `path` by `bytes`, or appends them to a stream.
