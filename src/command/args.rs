@@ -231,8 +231,9 @@ pub struct PlanArgs {
 /// Arguments of `zerkalo merge`.
 #[derive(Clone, Debug, Args)]
 pub struct MergeArgs {
-    /// Film files of the shards, in any order
-    #[arg(required = true, value_name = "PART.zk")]
+    /// The plan, which stands for the film files of its shards beside it: job.plan for job-0.zk,
+    /// job-1.zk and so on; or film files in any order
+    #[arg(required = true, value_name = "PLAN|PART.zk")]
     pub parts: Vec<PathBuf>,
     /// The file to write: a picture (.png, .exr) or a film (.zk)
     #[arg(short, long, value_name = "FILE")]

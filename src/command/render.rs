@@ -26,6 +26,8 @@ const DEFAULT_NOISE_LEVELS: f64 = 0.5;
 
 /// Interval at which signals and progress are polled.
 const POLL: Duration = Duration::from_millis(50);
+/// Time after a signal in which the first picture may still be completed.
+const FIRST_PICTURE: Duration = Duration::from_millis(400);
 
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     if let Some(plan) = &args.plan {
@@ -193,14 +195,24 @@ fn watch(
     mut checkpoints: Option<&mut CheckpointWriter>,
 ) -> Result<End, Failure> {
     let mut progress = Progress::on_stderr();
+    let mut caught = None;
+    let mut has_picture = false;
     let end = loop {
         if let Some(status) = signals.caught() {
-            break Ok(Err(status));
+            if has_picture {
+                break Ok(Err(status));
+            }
+            let caught: &mut Instant = caught.get_or_insert_with(Instant::now);
+            if caught.elapsed() >= FIRST_PICTURE {
+                warn("stopped by a signal before the first picture: nothing is written");
+                break Err(Failure::Signalled(status));
+            }
         }
         if let Some(checkpoints) = &mut checkpoints {
             checkpoints.poll(session);
         }
         let Some(snapshot) = session.wait(POLL) else { continue };
+        has_picture |= snapshot.report.first_picture_seconds.is_some();
         match &snapshot.report.state {
             State::Finished(reason) => break Ok(Ok(*reason)),
             State::Failed(reason) => break Err(Failure::Failed(reason.clone())),

@@ -76,6 +76,7 @@ fn shards_merged_in_any_order_equal_one_run_of_the_plan() {
         let (first, rest) = parts.split_at(parts.len() / 2);
         let args = ["merge", "--partial", "-o", "half.zk"];
         done(&desk, &[&args[..], &first.iter().map(String::as_str).collect::<Vec<_>>()].concat());
+        assert!(merge(&desk, &[plan], "plan.png") == one[0], "{shards} shards named by their plan");
         let steps = [&["half.zk".to_string()], rest].concat();
         assert!(merge(&desk, &steps, "steps.png") == one[0], "{shards} shards in two steps");
         merge(&desk, &parts, "merged.zk");

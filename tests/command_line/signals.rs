@@ -1,13 +1,18 @@
-//! Reactions of commands to SIGINT and SIGTERM, which tests send by `kill`.
+//! Reactions of commands to signals, which tests send by `kill`.
 
 use super::*;
 use crate::harness::*;
+use std::io::{BufRead, BufReader};
 use std::process::Child;
 
 pub fn signal(name: &str, id: u32) {
     let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
     assert!(sent.unwrap().success());
 }
+
+/// Signals by which users and batch systems end a render, with their numbers.
+const SIGNALS: [(&str, i32); 6] =
+    [("TERM", 15), ("HUP", 1), ("INT", 2), ("QUIT", 3), ("USR1", 10), ("XCPU", 24)];
 
 /// Longest time that a test waits. Only a failing test reaches it.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -67,23 +72,117 @@ fn signal_saves_the_picture_so_far() {
     }
 }
 
-/// Checks that a second signal ends the program at once. After the first signal alone, the program
-/// would write the picture when the wave ends, minutes later.
+/// Checks that repeated signals, which GNU `timeout` and GNU parallel send, do not end the write of
+/// picture and checkpoint.
 #[test]
-fn second_signal_ends_a_long_wave_at_once() {
+fn repeated_signals_lose_nothing() {
+    for (i, (name, number)) in SIGNALS.into_iter().enumerate() {
+        let desk = Desk::new();
+        let args = ["render", "scene.toml", "-o", "a.png", "--noise", "1e-6", "--time", "60"];
+        let keep = ["--size", "1600x1200", "--checkpoint", "a.zk", "--threads", "1"];
+        let mut child = spawn(&desk, &[&args[..], &keep].concat());
+        // The write takes some tenths of a second.
+        for pause in [0, 1 << i, 100, 200] {
+            std::thread::sleep(Duration::from_millis(pause));
+            if child.try_wait().unwrap().is_none() {
+                signal(name, child.id());
+            }
+        }
+        let run = Run::from(child.wait_with_output().unwrap());
+        assert_eq!(run.status, 128 + number, "{name}: {}", run.err);
+        if !run.err.contains("before the first picture") {
+            assert!(is_png(&desk.path("a.png")), "{name}");
+            FilmReader::open(&desk.path("a.zk")).and_then(FilmReader::verify).unwrap();
+            assert_eq!(desk.files(), ["a.png", "a.zk", "scene.toml"], "{name}");
+        }
+    }
+}
+
+/// Checks that a signal that the parent ignores, as `nohup` ignores SIGHUP, has no effect.
+#[test]
+fn ignored_signals_stay_ignored() {
     let desk = Desk::new();
-    let args = "render scene.toml -o a.png --size 4096x4096 --uniform --spp 9999"
-        .split(' ')
-        .collect::<Vec<_>>();
-    let child = spawn(&desk, &args);
-    signal("INT", child.id());
-    // The first signal must be delivered before the second is sent, because two pending SIGINTs
-    // count as one.
-    wait_for_status(child.id(), "ShdPnd:", 16, |pending| pending >> 1 & 1 == 0);
-    signal("INT", child.id());
+    let mut shell = Command::new("sh");
+    let script = r#"trap "" HUP; exec "$0" render scene.toml -o a.png --size 64x48 --time 0.5"#;
+    shell.args(["-c", script, env!("CARGO_BIN_EXE_zerkalo")]).current_dir(desk.0.path());
+    let child = shell.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for_status(child.id(), "Threads:", 10, |threads| threads > 1);
+    signal("HUP", child.id());
     let run = Run::from(child.wait_with_output().unwrap());
-    assert_eq!(run.status, 130, "{}", run.err);
-    assert_eq!((run.out.as_str(), desk.path("a.png").exists()), ("", false));
+    assert_eq!(run.status, 0, "{}", run.err);
+    assert!(!run.out.contains("signal"), "{}", run.out);
+}
+
+/// Checks that a write beyond the limit of file sizes is an error, not the end by SIGXFSZ.
+#[test]
+fn limit_of_file_sizes_is_an_error() {
+    let desk = Desk::new();
+    let script = r#"ulimit -f 1; exec "$0" render scene.toml -o a.png --size 320x240 --spp 2"#;
+    let mut shell = Command::new("sh");
+    shell.args(["-c", script, env!("CARGO_BIN_EXE_zerkalo")]).current_dir(desk.0.path());
+    let run = Run::from(shell.output().unwrap());
+    assert_eq!(run.status, 1, "{}", run.err);
+    assert!(run.err.contains("cannot write a.png: File too large"), "{}", run.err);
+    assert_eq!(desk.files(), ["scene.toml"]);
+}
+
+/// Checks that a write that fails is repeated: the folder of the outputs is away for a second.
+#[test]
+fn failed_last_writes_are_repeated() {
+    let desk = Desk::new();
+    let plan = ["plan", "scene.toml", "-o", "job.plan", "--size", "64x48", "--shards", "1"];
+    let run = desk.run(&[&plan[..], &["--noise", "0.0005", "--pilot", "1"]].concat());
+    assert_eq!(run.status, 0, "{}", run.err);
+    let render = "render scene.toml -o out/a.png --noise 1e-6 --time 60 --checkpoint out/a.zk";
+    let shard = "render scene.toml --plan job.plan --shard 1 -o out/a.zk";
+    for (args, files) in [(render, &["a.png", "a.zk"][..]), (shard, &["a.zk"])] {
+        fs::create_dir(desk.path("out")).unwrap();
+        let mut child = spawn(&desk, &args.split(' ').collect::<Vec<_>>());
+        // The first picture exists.
+        std::thread::sleep(Duration::from_millis(500));
+        fs::rename(desk.path("out"), desk.path("away")).unwrap();
+        signal("TERM", child.id());
+        let mut err = BufReader::new(child.stderr.take().unwrap());
+        let mut line = String::new();
+        while !line.contains("trying again in 1 s") {
+            line.clear();
+            assert!(err.read_line(&mut line).unwrap() > 0, "{args}: no second attempt");
+        }
+        assert!(line.contains("the directory out does not exist"), "{line}");
+        fs::rename(desk.path("away"), desk.path("out")).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(143), "{args}");
+        let mut names: Vec<_> = fs::read_dir(desk.path("out")).unwrap().flatten().collect();
+        names.sort_by_key(fs::DirEntry::file_name);
+        let names: Vec<_> = names.iter().map(|e| e.file_name().into_string().unwrap()).collect();
+        assert_eq!(names, files, "{args}");
+        fs::remove_dir_all(desk.path("out")).unwrap();
+    }
+}
+
+/// Checks that one process at a time continues a checkpoint.
+#[test]
+fn second_render_on_a_checkpoint_waits_for_the_first() {
+    let desk = Desk::new();
+    let args = ["render", "scene.toml", "-o", "a.png", "--size", "64x48", "--time", "60"];
+    let keep = ["--checkpoint", "a.zk", "--resume", "a.zk", "--checkpoint-interval", "0.05"];
+    let args = [&args[..], &keep].concat();
+    let first = spawn(&desk, &args);
+    wait_for_file(&desk.path("a.zk"));
+    let piped = || Stdio::piped();
+    let mut second = desk.command(&args).stdout(piped()).stderr(piped()).spawn().unwrap();
+    let mut err = BufReader::new(second.stderr.take().unwrap());
+    let mut line = String::new();
+    err.read_line(&mut line).unwrap();
+    let note = "note: cannot write a.zk: another process is writing it";
+    assert!(line.starts_with(note) && line.contains("waiting for up to 60 s"), "{line}");
+    signal("TERM", first.id());
+    let first = Run::from(first.wait_with_output().unwrap());
+    assert_eq!(first.status, 143, "{}", first.err);
+    wait_for_status(second.id(), "Threads:", 10, |threads| threads > 1);
+    std::thread::sleep(Duration::from_millis(200));
+    signal("TERM", second.id());
+    assert_eq!(second.wait().unwrap().code(), Some(143));
+    assert!(is_png(&desk.path("a.png")));
 }
 
 #[test]

@@ -6,6 +6,7 @@ use crate::pass::{PassContext, TileRenderer};
 use crate::wave::{JobReport, Wave, WaveReport};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 use zerkalo_kernel::lanes::SimdFloat;
 use zerkalo_world::{Counts, TileTracer, World};
 
@@ -15,10 +16,14 @@ const STRIP_TILES: usize = 8;
 /// Largest step \[pixels\] of a stage in which one tile has enough pixels to fill packets.
 const SHARED_ABOVE: usize = 2;
 
+/// Time after which the first stage can be cancelled. The first stage of most scenes is complete
+/// before, so that there is a coarse picture while the scene is being edited.
+const FIRST_STAGE: Duration = Duration::from_millis(250);
+
 /// Traces the first sample of every pixel in the tiles of `wave`, in replicate A: first every 8th
 /// pixel in x and y, then in three stages the pixels between, with steps of 4, 2 and 1. Calls
-/// `on_stage` with the film after every stage except the last. A cancelled pass completes its first
-/// stage, starts no jobs of later stages, and returns `None`.
+/// `on_stage` with the film after every stage except the last. A cancelled pass starts no jobs of
+/// later stages, nor of a first stage that is slow, and returns `None`.
 pub fn run<L: SimdFloat>(
     world: &World<L>,
     film: &mut Film,
@@ -31,6 +36,7 @@ pub fn run<L: SimdFloat>(
     let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
     let mut counts = vec![Counts::default(); tiles.len()];
     let mut previous_step = 0;
+    let start = Instant::now();
     for step in [8, 4, 2, 1] {
         let mut strips: Vec<(Vec<TileHandle>, &mut [Counts])> = Vec::new();
         let mut slots = film.slots(&tiles).into_iter();
@@ -41,7 +47,8 @@ pub fn run<L: SimdFloat>(
             strips
                 .into_par_iter()
                 .map(|(slots, counts)| {
-                    if step != 8 && cancel.load(Ordering::Relaxed) {
+                    let may_end = step != 8 || start.elapsed() >= FIRST_STAGE;
+                    if may_end && cancel.load(Ordering::Relaxed) {
                         return false;
                     }
                     renderer.lattice(slots, (previous_step, step), counts);

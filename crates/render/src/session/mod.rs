@@ -11,8 +11,8 @@
 //! film, its samples and the schedule; only the noise is estimated again. Long waves are traced in
 //! pieces, so that clients see the picture improve. The pieces have no influence on the samples.
 //!
-//! No call blocks, except [`Session::with`], [`Session::wait`] and the drop of a session that
-//! renders.
+//! No call blocks, except [`Session::with`], [`Session::wait`] and, for a moment, the drop of a
+//! session that renders.
 //!
 //! [`Relighting`]: crate::Relighting
 
@@ -39,7 +39,7 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 pub use watch::WatchReport;
 use watch::Watcher;
 use worker::Worker;
@@ -74,6 +74,9 @@ struct Shared {
     compilations: std::sync::atomic::AtomicUsize,
 }
 
+/// Time for which the end of a session waits for its thread, which may be compiling a large scene.
+const END_PATIENCE: Duration = Duration::from_millis(200);
+
 /// Handle of a thread that renders scenes or watches film files, with a thread pool of its own.
 /// Dropping the handle ends the thread. A session that watches has no scene: it ignores commands
 /// that edit, pause or stop a render.
@@ -83,8 +86,8 @@ pub struct Session {
     /// Channel of the latest snapshot that has not been taken yet.
     pub snapshots: Receiver<Snapshot>,
     generations: u64,
-    /// Rendering thread, which is joined when the handle is dropped. `None` for a thread that
-    /// watches: it is not joined, because it may be reading from a slow disk.
+    /// Rendering thread, which is joined when the handle is dropped, if it ends soon. `None` for a
+    /// thread that watches: it may be reading from a slow disk.
     thread: Option<JoinHandle<()>>,
 }
 
@@ -226,7 +229,14 @@ impl Drop for Session {
     fn drop(&mut self) {
         self.send(Command::Quit);
         self.shared.cancel_first_pass.store(true, Ordering::Release);
-        if let Some(Err(panic)) = self.thread.take().map(JoinHandle::join)
+        let end = Instant::now() + END_PATIENCE;
+        let is_over = |thread: &JoinHandle<()>| {
+            while !thread.is_finished() && Instant::now() < end {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            thread.is_finished()
+        };
+        if let Some(Err(panic)) = self.thread.take().filter(is_over).map(JoinHandle::join)
             && !std::thread::panicking()
         {
             std::panic::resume_unwind(panic);
