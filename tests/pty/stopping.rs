@@ -73,6 +73,22 @@ fn sigtstp_restores_the_terminal_first() {
     });
 }
 
+/// Checks that the terminal is restored after the end of a session's leader, as in `ssh -t host
+/// zerkalo`, which has no controlling terminal then.
+#[test]
+fn killed_leader_of_a_session_restores_the_terminal() {
+    for name in ["KILL", "ABRT"] {
+        let fixture = Fixture::with_room();
+        let terminal = fixture.open(&["room.toml"], [100, 30]);
+        wait_for_picture(&terminal);
+        signal(name, terminal.process_id());
+        terminal.wait_for("the restored terminal", |screen| {
+            (!screen.alternate_screen() && !screen.hide_cursor()).then_some(())
+        });
+        assert!(is_left(&terminal), "{name}");
+    }
+}
+
 #[test]
 fn ctrl_z_without_shell_does_not_stop() {
     let fixture = Fixture::with_room();

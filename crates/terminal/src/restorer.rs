@@ -12,12 +12,14 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 
 /// Script of the helper process. `$0` is [`LEAVE`], and `$1` the modes in the format of `stty -g`. A
 /// line from the program ends the script. The modes are set only if output processing is still off
-/// (`-opost`); otherwise the user's shell has already set its own modes.
+/// (`-opost`); otherwise the user's shell has already set its own modes. The script uses the
+/// terminal of stdout: `/dev/tty` is gone if the program was the leader of its session.
 const PROGRAM: &str = "\
 trap '' INT QUIT TERM HUP TSTP TTIN TTOU
+exec 3>&1
 read -r _ && exit
-case $(stty -a </dev/tty) in *-opost*) stty \"$1\" </dev/tty ;; esac
-printf %s \"$0\" >/dev/tty";
+case $(stty -a <&3) in *-opost*) stty \"$1\" <&3 ;; esac
+printf %s \"$0\"";
 
 /// Helper process, which waits until this value is dropped or the program ends.
 pub struct Restorer {
@@ -35,7 +37,6 @@ impl Restorer {
         let mut shell = Command::new("/bin/sh")
             .args(["-c", PROGRAM, LEAVE, String::from_utf8_lossy(&modes).trim_end()])
             .stdin(Stdio::piped())
-            .stdout(Stdio::null())
             .stderr(Stdio::null())
             // Keys such as Ctrl-C and Ctrl-Z send no signals to other process groups.
             .process_group(0)
