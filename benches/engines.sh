@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # End-to-end test of the scripts in examples/many-machines: one plan traced by GNU parallel and by Slurm, with a
-# command killed (kill -9), a node drained and a node lost on purpose. The pictures must equal one run of the plan byte
+# command killed (kill -9), a node drained, a node lost and a time limit reached on purpose. The pictures must equal one run of the plan byte
 # by byte.
 #
 #   apt-get install parallel slurm-wlm munge
@@ -39,8 +39,9 @@ shard_process() {
     }
 }
 
+# plan NAME [SHARDS] [NOISE]
 plan() {
-    "$ZERKALO" plan scenes/gallery-glass.toml --size "$size" --noise "${NOISE:-0.25}" --pilot 2 --shards 8 \
+    "$ZERKALO" plan scenes/gallery-glass.toml --size "$size" --noise "${3:-${NOISE:-0.25}}" --pilot 2 --shards "${2:-8}" \
         -o "$work/$1.plan" --base "$work/$1-0.zk"
 }
 
@@ -52,6 +53,18 @@ echo "$(uname -sr), $(nproc) cores, zerkalo $("$ZERKALO" --version | cut -d' ' -
 plan one
 "$ZERKALO" render scenes/gallery-glass.toml --plan "$work/one.plan" -o "$work/one.png" 2>/dev/null
 say "one run of the plan is done"
+
+wait_for_jobs() {
+    while squeue -h -o '%i %T %r' | grep -q .; do
+        squeue -h -o '%i %T %r' > "$work/queue"
+        if grep -q "DependencyNeverSatisfied" "$work/queue"; then
+            cat "$work/queue" "$work"/*.log
+            scontrol show job
+            exit 1
+        fi
+        sleep 1
+    done
+}
 
 gnu_parallel() {
     plan job > /dev/null
@@ -155,20 +168,22 @@ slurm() {
     say "the maintenance of node2 is over"
     scontrol update NodeName=node2 State=RESUME
 
-    while squeue -h -o '%i %T %r' | grep -q .; do
-        squeue -h -o '%i %T %r' > "$work/queue"
-        if grep -q "DependencyNeverSatisfied" "$work/queue"; then
-            cat "$work/queue" "$work"/slurm-*.log
-            scontrol show job
-            exit 1
-        fi
-        sleep 1
-    done
+    wait_for_jobs
     say "logs of the tasks"
     for log in "$work"/slurm-[1-8].log "$work/slurm-merge.log"; do
         grep -hv '^\([0-9.]* % .* left\|$\)' "$log" | sed "s|$work/||g; s|^|        $(basename "$log" .log): |"
     done
     equal slurm
+
+    # One shard of some three minutes of processor time. Slurm ends tasks up to a minute after their limit.
+    plan limit 1 "${LIMIT_NOISE:-0.12}" > /dev/null
+    say "a time limit of two minutes"
+    SBATCH_OPTIONS="--time=2" examples/many-machines/slurm.sh scenes/gallery-glass.toml "$work/limit.plan" "$work/limit.png"
+    wait_for_jobs
+    grep 'exit status' "$work/limit-1.log" | sed 's/^/        /'
+    grep -q 'exit status 143' "$work/limit-1.log" || { echo "the shard was not stopped at its limit" >&2; exit 1; }
+    "$ZERKALO" render scenes/gallery-glass.toml --plan "$work/limit.plan" -o "$work/one.png" 2>/dev/null
+    equal limit
 }
 
 for engine in "$@"; do
