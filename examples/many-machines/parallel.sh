@@ -18,6 +18,7 @@ shards="$(sed -n 's/^shards //p' "$plan")"
 
 # Paths are inputs of GNU parallel, which quotes them for the shells of the hosts. `--retries` counts all attempts.
 # `--halt soon,fail=1` gives up when a shard has failed that often.
+# shellcheck disable=SC1083
 parallel --sshloginfile "$hosts" --jobs "${JOBS_PER_HOST:-1}" --retries 5 --halt soon,fail=1 --joblog "$parts.joblog" \
     exec {1} render {2} --plan {3} --shard {4} -o {5}-{4}.zk "${options[@]}" \
     ::: "$zerkalo" ::: "$scene" ::: "$plan" :::: <(seq "$shards") ::: "$parts"
