@@ -1,7 +1,7 @@
 //! Checkpoints of `zerkalo render`: written at intervals, on signals and at the end.
 
 use crate::command::{Failure, save, warn};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -12,7 +12,6 @@ use zerkalo_scene::disk::{Claim, Existing, WriteError, check_writable};
 
 /// Writer of checkpoints at intervals. Rendering pauses only while a checkpoint is encoded.
 pub struct CheckpointWriter {
-    path: PathBuf,
     claim: Arc<Mutex<Claim>>,
     interval: Duration,
     provenance: Provenance,
@@ -22,12 +21,11 @@ pub struct CheckpointWriter {
 }
 
 impl CheckpointWriter {
-    /// Creates a writer to the file at `path`, which it has claimed. The first checkpoint is due
-    /// after `interval`.
-    pub fn new(path: &Path, claim: Claim, interval: Duration, provenance: Provenance) -> Self {
+    /// Creates a writer to the file of `claim`. The first checkpoint is due after `interval`.
+    pub fn new(claim: Claim, interval: Duration, provenance: Provenance) -> Self {
         let due = Instant::now() + interval;
         let claim = Arc::new(Mutex::new(claim));
-        Self { path: path.to_path_buf(), claim, interval, provenance, due, written: None }
+        Self { claim, interval, provenance, due, written: None }
     }
 
     /// Checks that a render may write checkpoints to `path`, or continue the checkpoint `resume`.

@@ -124,9 +124,9 @@ fn as_a_whole(
         None => drop(session.set_scene(Arc::new(scene))),
     }
     let set_after = started.elapsed();
-    let mut checkpoints = args.checkpoint.as_ref().zip(claim).map(|(path, claim)| {
+    let mut checkpoints = claim.map(|claim| {
         let interval = Duration::from_secs_f64(args.checkpoint_interval.min(1e9));
-        CheckpointWriter::new(path, claim, interval, provenance.clone())
+        CheckpointWriter::new(claim, interval, provenance.clone())
     });
     let end = watch(&session, &signals, checkpoints.as_mut())?;
     // The checkpoint comes first: the picture can be written again from its samples, if the program

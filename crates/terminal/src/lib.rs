@@ -38,9 +38,7 @@ pub use clipboard::copied;
 pub use decode::Decoder;
 pub use input_reader::{InputReader, TimedEvent};
 pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};
-pub use signals::{
-    HUNG_UP, INTERRUPTED, SignalEvent, SignalQueue, Signals, is_in_foreground,
-};
+pub use signals::{HUNG_UP, INTERRUPTED, SignalEvent, SignalQueue, Signals, is_in_foreground};
 
 /// Event that was decoded from terminal input.
 #[derive(Clone, Debug, PartialEq)]

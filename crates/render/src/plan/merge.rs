@@ -22,7 +22,8 @@ impl Merged {
     /// shard. Without `partial`, it also fails if shards are missing or unfinished.
     pub fn of_files(paths: &[PathBuf], partial: bool) -> Result<Self, String> {
         let mut films = FilmFiles::of_parts(paths)?;
-        let part = films.part().ok_or("there are no parts; trace them by `zerkalo render --plan`")?;
+        let part =
+            films.part().ok_or("there are no parts; trace them by `zerkalo render --plan`")?;
         if !partial {
             check_complete(&films, &part)?;
         }

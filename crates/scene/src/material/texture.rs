@@ -186,11 +186,14 @@ impl crate::material::Material {
     /// a file.
     pub fn image_files(&self) -> impl Iterator<Item = (&'static str, &str, Option<&Arc<Image>>)> {
         let texture = match &self.texture {
-            Some(Texture::Image(image)) => Some(("texture", image.file.as_str(), image.content.content())),
+            Some(Texture::Image(image)) => {
+                Some(("texture", image.file.as_str(), image.content.content()))
+            }
             Some(Texture::Checker(_)) | None => None,
         };
         let bump = self.bump.as_ref();
-        let bump = bump.map(|Bump::Image(image)| ("bump", image.file.as_str(), image.content.content()));
+        let bump =
+            bump.map(|Bump::Image(image)| ("bump", image.file.as_str(), image.content.content()));
         let both = [texture, bump];
         both.into_iter().flatten().filter(|(_, file, _)| !file.is_empty())
     }

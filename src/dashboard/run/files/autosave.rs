@@ -5,8 +5,8 @@ use crate::dashboard::{Message, OrphanedEdits};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
-use zerkalo_scene::value::sanitized;
 use zerkalo_scene::disk::remove_stale;
+use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile};
 
 /// Pause in editing after which unsaved edits are written.
