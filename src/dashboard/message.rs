@@ -31,6 +31,8 @@ pub enum Message {
     Loaded(Box<Result<Arc<Scene>, SceneErrors>>),
     /// Another program has changed the scene file.
     ChangedOnDisk,
+    /// Another program has changed a mesh or image of the scene.
+    AssetsChanged,
     OrphanedEdits(OrphanedEdits),
     /// Warning that is shown until the next key.
     Warning(String),

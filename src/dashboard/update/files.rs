@@ -112,6 +112,15 @@ impl UpdateContext<'_> {
         }
     }
 
+    pub(super) fn assets_changed(&mut self) {
+        if self.model.is_busy() || self.model.is_unsaved() {
+            let text = "a mesh or image has changed on disk · save, then Ctrl-o reads it";
+            self.notify(Tone::Plain, text.to_string(), None);
+        } else {
+            self.emit(Effect::Load);
+        }
+    }
+
     /// Reads the scene file. If there are unsaved edits, asks `question` first.
     fn load(&mut self, question: String) {
         if self.model.is_unsaved() {

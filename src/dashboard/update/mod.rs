@@ -113,6 +113,7 @@ impl UpdateContext<'_> {
             Message::Saved(scene, result) => self.saved(scene, result),
             Message::Loaded(result) => self.loaded(*result),
             Message::ChangedOnDisk => self.changed_on_disk(),
+            Message::AssetsChanged => self.assets_changed(),
             Message::OrphanedEdits(edits) => self.orphaned_edits(edits),
             Message::Warning(text) => self.notify(Tone::Bad, capital(&text), None),
             Message::Exported(result) => self.exported(result),

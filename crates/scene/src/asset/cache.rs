@@ -6,12 +6,12 @@ use crate::asset::image::Image;
 use crate::asset::memory::{AssetKind, asset_memory};
 use crate::asset::mesh;
 use crate::asset::radiance_map::RadianceMap;
+use crate::disk::FileStamp;
 use crate::process_memory::missing_memory;
 use std::collections::HashSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::SystemTime;
 use zerkalo_kernel::primitive::Mesh;
 
 /// Largest total memory in bytes of the cached files that no scene uses. An undo may need them.
@@ -61,8 +61,7 @@ impl fmt::Display for LoadProgress {
 #[derive(Clone, PartialEq, Eq)]
 struct Key {
     path: PathBuf,
-    modified: Option<SystemTime>,
-    bytes: u64,
+    stamp: FileStamp,
 }
 
 /// Content of a file or the error of reading it. Empty until the file has been read.
@@ -73,12 +72,10 @@ struct Cache<T>(Vec<(Key, CacheEntry<T>)>);
 
 impl Key {
     fn of(path: &Path) -> Result<Self, AssetError> {
-        let metadata = std::fs::metadata(path).map_err(|e| read_error(path, &e))?;
-        Ok(Self {
-            path: std::fs::canonicalize(path).map_err(|e| read_error(path, &e))?,
-            modified: metadata.modified().ok(),
-            bytes: metadata.len(),
-        })
+        let stamp = std::fs::metadata(path).and_then(|metadata| FileStamp::new(&metadata));
+        let canonical = std::fs::canonicalize(path);
+        let key = stamp.and_then(|stamp| Ok(Self { path: canonical?, stamp }));
+        key.map_err(|error| read_error(path, &error))
     }
 }
 
@@ -94,6 +91,16 @@ impl<T> Cache<T> {
         let entry = known.unwrap_or_default();
         self.0.insert(0, (key, entry.clone()));
         entry
+    }
+
+    /// Returns the keys of the files that scenes use, or could not use.
+    fn used(&self) -> impl Iterator<Item = &Key> {
+        let is_used = |entry: &CacheEntry<T>| match entry.get() {
+            Some(Ok(file)) => Arc::strong_count(file) > 1,
+            Some(Err(_)) => true,
+            None => false,
+        };
+        self.0.iter().filter(move |(_, entry)| is_used(entry)).map(|(key, _)| key)
     }
 
     /// Evicts files that no scene uses, the least recently used first, until they take at most
@@ -148,7 +155,7 @@ impl Assets {
     /// Returns the mesh in the file at `path`.
     pub fn mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetError> {
         let read = |key: &Key| {
-            let needed = key.bytes.saturating_mul(mesh::parse_bytes(path));
+            let needed = key.stamp.bytes.saturating_mul(mesh::parse_bytes(path));
             check_memory(path, "the file", needed)?;
             let triangles = mesh::parse(&self.read(path, key, MAX_BYTES)?)?;
             let count = triangles.triangles.len();
@@ -186,7 +193,7 @@ impl Assets {
                 AssetKind::Texture => locked(&self.images).has(&key),
                 AssetKind::Environment => locked(&self.radiance_maps).has(&key),
             };
-            let length = key.bytes;
+            let length = key.stamp.bytes;
             if !is_cached && counted.insert((kind, key.path)) {
                 let [kept, further] = asset_memory(*kind, path, length);
                 sum = sum.saturating_add(kept);
@@ -205,8 +212,23 @@ impl Assets {
         })
     }
 
+    /// Returns the files of scenes that have changed since they were read, with their stamps now.
+    pub fn changed(&self) -> Vec<(PathBuf, Option<FileStamp>)> {
+        let mut known: Vec<Key> = locked(&self.meshes).used().cloned().collect();
+        known.extend(locked(&self.images).used().cloned());
+        known.extend(locked(&self.radiance_maps).used().cloned());
+        let now = |key: Key| {
+            let stamp = FileStamp::of(&key.path);
+            (stamp != Some(key.stamp)).then_some((key.path, stamp))
+        };
+        known.into_iter().filter_map(now).collect()
+    }
+
     fn read(&self, path: &Path, key: &Key, limit: u64) -> Result<FileContents, AssetError> {
-        (self.progress)(&LoadProgress::Reading { file: path.to_path_buf(), bytes: key.bytes });
+        (self.progress)(&LoadProgress::Reading {
+            file: path.to_path_buf(),
+            bytes: key.stamp.bytes,
+        });
         FileContents::read(path, limit)
     }
 }
@@ -324,7 +346,8 @@ mod tests {
     #[test]
     fn unused_files_are_evicted_least_recent_first() {
         let mut cache = Cache::<usize>(Vec::new());
-        let key = |name: &str| Key { path: name.into(), modified: None, bytes: 0 };
+        let stamp = FileStamp::of(Path::new(".")).unwrap();
+        let key = |name: &str| Key { path: name.into(), stamp };
         let put = |cache: &mut Cache<usize>, name| {
             let file = Arc::new(UNUSED_BYTES / 2);
             cache.entry(key(name)).set(Ok(file.clone())).unwrap();

@@ -1,6 +1,7 @@
 //! Stamps, by which changes of files are noticed.
 
-use std::fs;
+use std::fs::{self, Metadata};
+use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::time::{Duration, SystemTime};
@@ -17,7 +18,8 @@ pub struct FileStamp {
     /// Time of the last change of the inode, in seconds and nanoseconds. A file that is moved into
     /// place may have any time of the last write.
     changed: [i64; 2],
-    bytes: u64,
+    /// Length of the file.
+    pub bytes: u64,
     inode: u64,
     /// Time of this look, if the file may change in the same second. Two such looks differ.
     looked: Option<SystemTime>,
@@ -26,12 +28,16 @@ pub struct FileStamp {
 impl FileStamp {
     /// Returns the stamp of the file at `path`; `None` if its metadata cannot be read.
     pub fn of(path: &Path) -> Option<Self> {
-        let metadata = fs::metadata(path).ok()?;
-        let modified = metadata.modified().ok()?;
+        fs::metadata(path).and_then(|metadata| Self::new(&metadata)).ok()
+    }
+
+    /// Returns the stamp of the file with these metadata, which are read now.
+    pub fn new(metadata: &Metadata) -> io::Result<Self> {
+        let modified = metadata.modified()?;
         let now = SystemTime::now();
         let is_recent = now.duration_since(modified).is_ok_and(|age| age < UNCERTAIN);
         let looked = (metadata.ctime_nsec() == 0 && is_recent).then_some(now);
         let changed = [metadata.ctime(), metadata.ctime_nsec()];
-        Some(Self { modified, changed, bytes: metadata.len(), inode: metadata.ino(), looked })
+        Ok(Self { modified, changed, bytes: metadata.len(), inode: metadata.ino(), looked })
     }
 }

@@ -35,6 +35,8 @@ pub struct FileWorker {
     pub file: Option<SceneFile>,
     /// Stamp of the scene file when it was last read, written or checked.
     pub seen: Option<FileStamp>,
+    /// Meshes and images that had changed at the latest check.
+    pub seen_assets: Vec<(PathBuf, Option<FileStamp>)>,
     /// State folder of the user (XDG).
     pub state: Option<PathBuf>,
     pub autosaves: Sender<AutosaveJob>,
@@ -66,6 +68,8 @@ impl FileWorker {
                 checked = now;
                 if self.changed() {
                     self.send(Message::ChangedOnDisk);
+                } else if self.assets_changed() {
+                    self.send(Message::AssetsChanged);
                 }
             }
         }
@@ -89,6 +93,15 @@ impl FileWorker {
             Some(file) => file.on_disk() == DiskState::Changed,
             None => now.is_some(),
         }
+    }
+
+    /// Returns `true` if another program has changed a mesh or image since the last check.
+    fn assets_changed(&mut self) -> bool {
+        let Some(file) = &self.file else { return false };
+        let changed = file.document.scene().resolver.assets.changed();
+        let is_new = !changed.is_empty() && changed != self.seen_assets;
+        self.seen_assets = changed;
+        is_new
     }
 
     /// Writes the scene file, and informs the other threads of its new contents.

@@ -29,6 +29,10 @@ const SAVED_WITHIN: Duration = Duration::from_secs(2);
 /// [`SAVED_WITHIN`] together are shorter than the grace period after a terminating signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
+/// Path of the recovery file that keeps unsaved edits; `None` if there are none to keep. The error
+/// is a message for the user.
+type Kept = Result<Option<PathBuf>, String>;
+
 /// Handle of the threads that access the scene file and the recovery file.
 pub struct Files {
     jobs: Sender<Job>,
@@ -36,7 +40,7 @@ pub struct Files {
     pub shared: SharedFile,
     /// Newest scene with unsaved edits.
     unsaved: Option<Arc<Scene>>,
-    threads: Option<(Worker<()>, Worker<Result<Option<PathBuf>, String>>)>,
+    threads: Option<(Worker<()>, Worker<Kept>)>,
 }
 
 impl Files {
@@ -71,6 +75,7 @@ impl Files {
             path,
             file,
             seen,
+            seen_assets: Vec::new(),
             state,
             autosaves: autosaves.clone(),
             shared: shared.clone(),
@@ -230,6 +235,29 @@ mod tests {
         files.give(Job::Load);
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
         assert!(files.shared.get().is_some());
+    }
+
+    #[test]
+    fn changed_mesh_is_noticed_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            fs::write(folder.path().join(name), text).unwrap();
+            folder.path().join(name)
+        };
+        let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        write("m.obj", triangle);
+        let scene = "ambient.color = [1, 1, 1]\n[[object]]\nshape.mesh = { file = \"m.obj\" }\n";
+        let (files, inbox) = opened(&write("a.toml", scene));
+        let quiet = inbox.recv_timeout(CHECK_INTERVAL + CHECK_INTERVAL / 2);
+        assert!(quiet.is_err(), "{quiet:?}");
+        write("m.obj", &triangle.replace("1 0 0", "2 0 0"));
+        assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::AssetsChanged));
+        let quiet = inbox.recv_timeout(CHECK_INTERVAL + CHECK_INTERVAL / 2);
+        assert!(quiet.is_err(), "reported once: {quiet:?}");
+        files.give(Job::Load);
+        assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
+        let quiet = inbox.recv_timeout(CHECK_INTERVAL + CHECK_INTERVAL / 2);
+        assert!(quiet.is_err(), "read anew: {quiet:?}");
     }
 
     #[test]
