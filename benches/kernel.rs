@@ -112,7 +112,7 @@ fn list_or_tree(c: &mut Criterion) {
             if n > 256 && !tree {
                 continue;
             }
-            let geometry = Aggregate::<Single>::with_tree(&forms, tree);
+            let geometry = Aggregate::<Single>::with_bvh(&forms, tree);
             group.bench_function(name, |b| {
                 b.iter(|| {
                     for ray in &rays {

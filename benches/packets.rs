@@ -53,7 +53,7 @@ fn rays_towards(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
 
 /// Creates a function that traces `rays` against `form`.
 fn tracer<L: SimdFloat>(form: &Form, rays: &[([f64; 3], [f64; 3])]) -> impl FnMut() + use<L> {
-    let geometry = Aggregate::<L>::with_tree(std::slice::from_ref(form), false);
+    let geometry = Aggregate::<L>::with_bvh(std::slice::from_ref(form), false);
     let vector = |v: [f64; 3]| v.map(L::Scalar::from_f64);
     let packet = |rays: &[([f64; 3], [f64; 3])]| Ray::<L> {
         origin: Vec3::from_fn(|i| vector(rays[i].0)),

@@ -98,7 +98,8 @@ fn usable(cap: u64) -> (u64, &'static str) {
     }
 }
 
-/// Returns the error for `least`, the least number of bytes with which the picture can be rendered.
+/// Returns the error for a picture that needs at least `least` bytes of memory, where `limit`, an
+/// option or a property of the machine, permits only `cap` bytes.
 fn too_little(least: u64, cap: u64, limit: &'static str) -> Failure {
     // The resident memory differs by up to a megabyte from run to run.
     let least = (least + 1_000_000).div_ceil(1_000_000);

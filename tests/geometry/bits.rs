@@ -22,7 +22,7 @@ fn same3<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, lane: usize) -> bool {
 /// Compares packets of the SIMD type `L` with single rays. Both intersect an aggregate (list, or BVH
 /// if `tree` is `true`) of all `forms`.
 fn compare<L: SimdFloat>(name: &str, forms: &[Form], tree: bool, lines: &[Line]) {
-    let geometry = Aggregate::<L>::with_tree(forms, tree);
+    let geometry = Aggregate::<L>::with_bvh(forms, tree);
     for (n, (packet, count)) in packets::<L>(lines).enumerate() {
         let hit = geometry.closest(&packet, geometry.all());
         let hit_mask = hit.t.lt(L::from_f64(L::MAX));

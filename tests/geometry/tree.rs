@@ -33,7 +33,7 @@ fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
 }
 
 fn compare<L: SimdFloat>(seed: u64, count: usize, forms: &[Form], lines: &[Line]) {
-    let list = Aggregate::<L>::with_tree(forms, false);
+    let list = Aggregate::<L>::with_bvh(forms, false);
     for structure in [
         AccelerationStructure::Bvh,
         AccelerationStructure::Boxes { oriented: true },

@@ -29,7 +29,7 @@ fn check_slab<L: SimdFloat>() -> f64 {
         2.0 * HALF_WIDTH
     ));
     let form = slab.objects[0].shape.form();
-    let geometry = Aggregate::<L>::with_tree(&[form], false);
+    let geometry = Aggregate::<L>::with_bvh(&[form], false);
     let number = |x: L| x.lane(0).to_f64();
     let mut worst = 0f64;
     for n in [1.0, 1.33, 1.5, 2.4, 1e3] {

@@ -28,8 +28,8 @@ pub struct Wave {
 impl Wave {
     /// Shortens each job to at most `longest` samples per pixel; `longest` is at least
     /// [`SAMPLE_ALIGNMENT`]. A shortened job ends at a multiple of [`SAMPLE_ALIGNMENT`], so that
-    /// the packets of the rest are full. Keeps only the first jobs: as many as hold `pixel_samples`
-    /// samples over all pixels, and at least one.
+    /// the packets of the rest are full. Keeps the fewest first jobs, at least one, that together
+    /// reach `pixel_samples` samples over all pixels.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;

@@ -45,8 +45,9 @@ impl History {
         &self.now
     }
 
-    /// Makes `scene` the current scene. `held` is `true` during a gesture. Returns `true` if the
-    /// scene has changed; if it has not, nothing is recorded.
+    /// Makes `scene` the current scene. Successive calls with `held` and the same label, as during
+    /// a gesture, make one undo step. Returns `true` if the scene has changed; if it has not,
+    /// nothing is recorded.
     pub fn record(&mut self, scene: Arc<Scene>, label: &str, held: bool) -> bool {
         if *scene == *self.now {
             return false;

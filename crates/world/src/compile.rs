@@ -315,7 +315,7 @@ fn culling<L: SimdFloat>(
         Acceleration::Auto => {
             let culler = FrustumCuller::new(forms().collect(), outside_only, lights);
             all_candidates = culler.candidates(geometry, None);
-            if geometry.has_tree() {
+            if geometry.has_bvh() {
                 if scene.trace.ray_types >= RayTypes::Shadows {
                     light_buffers = culler.light_buffers(geometry);
                 }
@@ -323,7 +323,7 @@ fn culling<L: SimdFloat>(
                     let form = form_of(&geometry.sources[primitive as usize]);
                     (primitive, ScreenBounds::project(form, camera))
                 };
-                let bounds = geometry.in_tree().into_iter().map(project);
+                let bounds = geometry.in_bvh().into_iter().map(project);
                 let size = scene.film.size.map(|n| n as usize);
                 CullingMode::ScreenGrid(ScreenGrid::new(size, bounds))
             } else {
@@ -438,7 +438,7 @@ impl<L: SimdFloat> World<L> {
         Self {
             smooth,
             colored,
-            simple: !smooth && !colored && geometry.has_no_tree(),
+            simple: !smooth && !colored && geometry.is_plain_list(),
             surface_textures: textures,
             shadows: scene.trace.ray_types >= RayTypes::Shadows && !geometry.is_empty(),
             depth: if materials.has_secondary() { scene.trace.max_depth } else { 0 },

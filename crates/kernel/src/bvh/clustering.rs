@@ -30,8 +30,8 @@ pub struct SearchWindow {
     pub distance: usize,
 }
 
-/// Half the surface area of the box around a node and its nearest node, and the index of the
-/// nearest node in the list of the pass.
+/// Nearest node of a node: half the surface area of the box around both, and the index of the
+/// nearest node among the nodes of the present pass.
 type Nearest = (f32, u32);
 
 /// Builds a binary BVH of the boxes `bounds`, at least one, with one primitive in each leaf.

@@ -128,7 +128,7 @@ impl Form {
     pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
         let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
         let ray = Ray { origin: vector(origin), direction: vector(direction) };
-        let alone = Aggregate::with_tree(std::slice::from_ref(self), false);
+        let alone = Aggregate::with_bvh(std::slice::from_ref(self), false);
         let hit = alone.closest(&ray, alone.all());
         if hit.t >= f64::MAX {
             return None;

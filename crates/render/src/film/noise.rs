@@ -51,7 +51,8 @@ pub struct ByMeasure {
 }
 
 impl ByMeasure {
-    /// Value of [`TileNoise::squares`] for tests: that of an error spread over very many pixels.
+    /// Smallest positive [`TileNoise::squares`], for tests: [`Noise::effective_pixels`] divides by
+    /// it, so that the error counts as spread over very many pixels.
     #[cfg(test)]
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
 

@@ -104,7 +104,8 @@ impl FileMetadata {
 mod tests {
     use super::*;
 
-    /// Checks a text of a few bytes, another one of 64 KiB, and a short chunk of a long text.
+    /// Checks that texts of up to `TEXT_BYTES` are read in full, and that a longer one, even in a
+    /// short compressed chunk, is not inflated.
     #[test]
     fn long_texts_are_not_inflated() {
         let folder = tempfile::tempdir().unwrap();

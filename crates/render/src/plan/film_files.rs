@@ -40,7 +40,8 @@ struct NamedPlan {
 #[derive(Debug)]
 struct FilmFile {
     path: PathBuf,
-    /// Number of the shard that this file should hold, if a named plan lists the file.
+    /// Number of the shard that a plan on the command line expects in this file. `None` for a file
+    /// that no such plan lists.
     shard: Option<u32>,
     /// Stamp of the file when it was last read. `None` for a missing file.
     stamp: Option<FileStamp>,

@@ -83,8 +83,8 @@ pub(super) struct SourcePart<'a> {
 }
 
 /// Checks that the films of `parts` can be added, and returns their common plan. One of the films
-/// may be the base of this plan, merged by an earlier plan. Its part is replaced by a part of the
-/// common plan that holds only the shard [`BASE`].
+/// may be the merged film of an earlier plan, if the common plan has it as its base. Its part is
+/// replaced by a part of the common plan that holds only the shard [`BASE`].
 ///
 /// # Errors
 /// Fails if there is no part, if the parts belong to different plans, if two of them hold the same

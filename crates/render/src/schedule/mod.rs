@@ -39,8 +39,8 @@ const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
 /// Number of [`Noise::effective_pixels`] below which a noise estimate is unreliable. With k
 /// effective pixels the relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
-/// Number of which sample counts per pixel and replicate are multiples, except for smaller counts
-/// and counts after the last block of a tile. It is the width of the widest packets, on every
+/// Number by which all sample counts per pixel and replicate can be divided, except smaller counts
+/// and those after the last block of a tile. It is the width of the widest packets on every
 /// processor, because the samples of a picture must not depend on the processor.
 pub const SAMPLE_ALIGNMENT: u32 = 16;
 /// Samples per pixel and replicate at which a tile is full: the largest multiple of

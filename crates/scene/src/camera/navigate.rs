@@ -137,7 +137,8 @@ impl Camera {
         self.valid_or_self(aimed.placed(center - forward * distance, forward, distance))
     }
 
-    /// Returns the distance to the target, or `distance` without a target; 1 if it is invalid.
+    /// Returns the distance to the target, or `distance` if there is no target. If that is not
+    /// positive and finite, returns 1.
     fn pivot_distance(&self, distance: f64) -> f64 {
         let to_target = self.target.map(|t| DVec3::from_array(t) - DVec3::from_array(self.eye));
         let distance = to_target.map_or(distance, DVec3::length);

@@ -214,7 +214,8 @@ fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     }
 }
 
-/// Returns `x`, doubled or halved for each coarse step, or changed by 1 for each fine step.
+/// Returns `x` after some steps: a coarse step doubles or halves it, rounded down, and leads from 0
+/// to 1; a fine step adds 1. The result is in `range`.
 fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let moved = match steps {
         _ if fine => x + steps as f64,

@@ -147,9 +147,9 @@ mod tests {
     /// Checks that the irradiance around a spot light follows the smoothstep of the cosine of the
     /// angle to its axis. `L` is the number type and `epsilon` its rounding error.
     ///
-    /// The tolerance follows from the error of the direction to the light. This error is about ten
-    /// times `epsilon`, because coordinates are below 8 and distances at least 0.5. The smoothstep
-    /// multiplies the error by its slope, which is at most 1.5 times that of t (see [`SpotCone`]).
+    /// The tolerance follows from the rounding of the direction to the light: coordinates below 8
+    /// and distances of at least 0.5 make it about ten times `epsilon`. The smoothstep multiplies
+    /// this error by its slope, which is at most 1.5 times that of t, the variable of [`SpotCone`].
     fn check<L: SimdFloat>(epsilon: f64) {
         let origin = DVec3::new(0.25, 0.0, 0.5);
         for (inner, outer) in [(10.0, 30.0), (0.0, 90.0), (0.0, 0.5), (70.0, 160.0), (180.0, 180.0)]

@@ -47,7 +47,8 @@ pub enum ReflectionLobe<S> {
         /// 1 - cos of the cone's half-angle.
         one_minus_cos: S,
     },
-    /// Directions through uniform points of a square across the axis, at unit distance.
+    /// Directions through uniform points of a square that is perpendicular to the axis and centred
+    /// on it, at distance 1.
     Square {
         /// Side length of the square.
         side: S,
@@ -97,8 +98,8 @@ pub struct Bsdf<S> {
     pub lobe: ReflectionLobe<S>,
     /// Fresnel reflectance of the microfacets in a highlight.
     pub highlight_fresnel: Reflectance<S>,
-    /// Fresnel reflectance of reflected rays. It is 1 for a transparent dielectric, whose
-    /// reflectance depends on the medium on the other side of the surface.
+    /// Fresnel reflectance of reflected rays. It is 1 for a transparent dielectric: its interface
+    /// computes the reflectance at each hit, because that depends on the medium on the other side.
     pub reflection_fresnel: Reflectance<S>,
     /// `true` if the surface has a diffuse part or highlights.
     pub has_direct: bool,

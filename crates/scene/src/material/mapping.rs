@@ -200,9 +200,9 @@ impl<S: Float> TextureMapping<S> {
         (beside(u, grad_u, su, ou, periodic), beside(v, grad_v, sv, ov, false))
     }
 
-    /// Returns the unit normal perturbed by a bump map, whose height has the gradient `gradient` in
-    /// texture space; bumps are thus transformed with their object. `outward` is 1 if `normal` is
-    /// the outer normal, along which heights rise, and -1 if it is the inner normal.
+    /// Returns the unit normal perturbed by a bump map. `gradient` is the gradient of its height in
+    /// texture space, so that bumps move and scale with their object. Heights rise along the outer
+    /// normal: `outward` is 1 if `normal` is the outer normal, and -1 if it is the inner one.
     pub fn bumped<L: SimdFloat<Scalar = S>>(
         &self,
         normal: Vec3<L>,

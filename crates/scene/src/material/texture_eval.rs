@@ -149,14 +149,15 @@ impl BumpMap {
     /// pixel boundaries.
     pub fn gradient<L: SimdFloat>(&self, (u, v): (L, L), bits: u32) -> (L, L) {
         let slopes: Vec3<L> = gathered(bits, |lane| {
-            let [du, dv] = self.slope_at(u.lane(lane).to_f64(), v.lane(lane).to_f64());
+            let [du, dv] = self.gradient_at(u.lane(lane).to_f64(), v.lane(lane).to_f64());
             [du, dv, 0.0]
         });
         (slopes.x, slopes.y)
     }
 
-    /// Returns the derivatives of [`BumpMap::gradient`] at one pair of texture coordinates.
-    fn slope_at(&self, u: f64, v: f64) -> [f64; 2] {
+    /// Returns [`BumpMap::gradient`] at one pair of texture coordinates: the derivatives of the
+    /// height with respect to u and v.
+    fn gradient_at(&self, u: f64, v: f64) -> [f64; 2] {
         let [width, height] = self.image.size();
         let wrap = self.wrap;
         let (x, fx) = pixel_position(u, width, wrap);

@@ -5,8 +5,9 @@ use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo_kernel::primitive::Projection;
 
-/// Texture space of a shape that is no compound, in scene units before the object's transform. Its
-/// x points to the right, y up or along the shape's axis, z to the front or along the normal.
+/// Texture space of a simple shape, in scene units before the object's transform. x points to the
+/// right, y points up or along the shape's axis, and z points to the shape's front or along its
+/// normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureSpace {
     /// Map from texture space to the space of the shape, or of the whole compound.

@@ -55,7 +55,8 @@ pub trait KeyNode {
         false
     }
 
-    /// Makes an optional value absent.
+    /// Removes the value of an optional key, which then counts as omitted. Has no effect on other
+    /// values.
     fn make_absent(&mut self) {}
 
     /// Returns the child `key`, if any: a key of a table, the kind of a value, or an index from 0.

@@ -74,7 +74,7 @@ struct Busy {
 pub struct QueueSample {
     /// Only frame of a busy period that has ended. `None` for several frames.
     pub alone: Option<LoneFrame>,
-    /// Bytes per second that left the queue.
+    /// Bytes per second that left the queue; `None` if the measurement shows no rate.
     pub rate: Option<f64>,
     /// `true` if `rate` is the rate of the connection. If `false`, the connection may be faster.
     pub is_full: bool,

@@ -57,7 +57,7 @@ pub(crate) struct Occluder {
 /// Possible occluder in the list of a cell.
 #[derive(Clone, Copy)]
 struct Entry<S> {
-    /// Index of the primitive in [`Aggregate::in_tree`].
+    /// Index of the primitive in [`Aggregate::in_bvh`].
     number: u32,
     /// Value of [`Occluder::exempt_primitive`]; [`NO_PRIMITIVE`] stands for `None`.
     exempt_primitive: u32,
@@ -233,7 +233,7 @@ mod tests {
         let form =
             |b: &BoundingSphere| Form::Sphere(SphereForm { center: b.center, radius: b.radius });
         let forms: Vec<Form> = balls.iter().map(form).collect();
-        let geometry = Aggregate::<L>::with_tree(&forms, true);
+        let geometry = Aggregate::<L>::with_bvh(&forms, true);
         let Some(buffer) = LightBuffer::<L::Scalar>::new(target, &occluders(balls)) else {
             panic!("no buffer for {} balls", balls.len());
         };
@@ -331,7 +331,7 @@ mod tests {
             BoundingSphere { center: DVec3::X * 5.0, radius: 1.0 },
         ];
         let forms = balls.map(|b| Form::Sphere(SphereForm { center: b.center, radius: b.radius }));
-        let geometry = Aggregate::<Single>::with_tree(&forms, true);
+        let geometry = Aggregate::<Single>::with_bvh(&forms, true);
         let target = LightTarget::point(DVec3::Y * 9.0);
         let buffer = LightBuffer::<f32>::new(&target, &occluders(&balls)).expect("a buffer");
         let ray = Ray { origin: Vec3::<Single>::zero(), direction: Vec3::of([0.0, 1.0, 0.0]) };

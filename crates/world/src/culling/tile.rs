@@ -139,7 +139,7 @@ impl FrustumCuller {
             ball: self.bounds[primitive as usize].ball,
             exempt_primitive: (!self.self_shadowing[primitive as usize]).then_some(primitive),
         };
-        let occluders: Vec<Occluder> = geometry.in_tree().into_iter().map(occluder).collect();
+        let occluders: Vec<Occluder> = geometry.in_bvh().into_iter().map(occluder).collect();
         self.lights.delta_lights.iter().map(|light| LightBuffer::new(light, &occluders)).collect()
     }
 

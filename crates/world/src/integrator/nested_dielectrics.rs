@@ -185,7 +185,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let solid_around_eye = |(form, solid): (usize, &Option<_>)| {
             let may_contain_eye = solid.is_some() && may_reach(start, &forms[form]);
             may_contain_eye
-                .then(|| (form as u32 + 1, Aggregate::with_tree(&forms[form..=form], false)))
+                .then(|| (form as u32 + 1, Aggregate::with_bvh(&forms[form..=form], false)))
         };
         let around_eye = solids[1..].iter().enumerate().filter_map(solid_around_eye).collect();
         let vacuum = L::Scalar::from_f64(1.0);

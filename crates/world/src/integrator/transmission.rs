@@ -165,10 +165,11 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         self.follow(branch, &mut split, coincident.as_ref(), waiting, &mut out.counts)
     }
 
-    /// Resolves hits of `lanes` on coincident surfaces: changes `hit` and `interaction` to the
-    /// surface that the path crosses first. `behind` is the coincident surface behind the start
-    /// points of the rays, if one was found, and `media` are the media of the rays. Returns the
-    /// state of rays that pass the surface, or `None` if no surfaces coincide.
+    /// Orders coincident surfaces: replaces `hit` and `interaction` in those of `lanes` that hit
+    /// several surfaces at one place by the surface that takes effect first. `behind` is the next
+    /// coincident surface of rays that start on one, and `media` are the media of the rays. Returns
+    /// the state with which transmitted rays look for the following surface; `None` if no surfaces
+    /// coincide.
     #[inline(never)]
     fn cross_first(
         &self,

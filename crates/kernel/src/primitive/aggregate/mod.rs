@@ -97,9 +97,9 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Compiles the canonical forms `forms`, with or without a BVH.
-    pub fn with_tree(forms: &[Form], tree: bool) -> Self {
+    pub fn with_bvh(forms: &[Form], has_bvh: bool) -> Self {
         let list = AccelerationStructure::List("list");
-        Self::with_structure(forms, if tree { AccelerationStructure::Bvh } else { list })
+        Self::with_structure(forms, if has_bvh { AccelerationStructure::Bvh } else { list })
     }
 
     /// Compiles the canonical forms `forms`.
@@ -171,18 +171,18 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Returns the numbers of the primitives in the BVH, in ascending order.
-    pub fn in_tree(&self) -> Vec<u32> {
+    pub fn in_bvh(&self) -> Vec<u32> {
         let number = |(index, i): &(usize, usize)| self.batches[*index].base + *i as u32;
         self.in_bvh.iter().map(number).collect()
     }
 
     /// Returns `true` if the aggregate has a BVH.
-    pub fn has_tree(&self) -> bool {
+    pub fn has_bvh(&self) -> bool {
         self.bvh.is_some()
     }
 
     /// Returns `true` if there are neither a BVH nor bounding boxes of primitives.
-    pub fn has_no_tree(&self) -> bool {
+    pub fn is_plain_list(&self) -> bool {
         self.bvh.is_none() && self.boxes.is_empty()
     }
 
@@ -336,7 +336,7 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Returns the lanes of `wanted` whose ray hits one given primitive of the BVH at a distance
-    /// between 0 and `limit`. `number` is the index of this primitive in [`Aggregate::in_tree`].
+    /// between 0 and `limit`. `number` is the index of this primitive in [`Aggregate::in_bvh`].
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (index, i) = self.in_bvh[number as usize];
