@@ -16,7 +16,7 @@ use crate::lights::groups::{LightGroupSource, LightGroups};
 use crate::lights::on_surfaces::OnSurface;
 use crate::world::{DeltaSource, EnvironmentSource, ShadowRayTarget, World, WorldInfo};
 use glam::{DAffine3, DVec3};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use zerkalo_kernel::lanes::{Float, SimdFloat};
 use zerkalo_kernel::primitive::{
     AccelerationStructure, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
@@ -359,7 +359,11 @@ fn outside_only<L: SimdFloat>(
 }
 
 /// Compiles `forms`, with the acceleration structure that the scene selects.
-fn aggregate<L: SimdFloat>(scene: &Scene, forms: &[Form]) -> Aggregate<L> {
+fn aggregate<L: SimdFloat>(
+    scene: &Scene,
+    forms: &[Form],
+    materials: &CompiledMaterials<L::Scalar>,
+) -> Aggregate<L> {
     let structure = match scene.trace.acceleration {
         Acceleration::Auto => AccelerationStructure::fastest(forms),
         Acceleration::None => AccelerationStructure::List("bare list"),
@@ -368,7 +372,35 @@ fn aggregate<L: SimdFloat>(scene: &Scene, forms: &[Form]) -> Aggregate<L> {
         Acceleration::Aabb => AccelerationStructure::Boxes { oriented: false },
         Acceleration::Bvh => AccelerationStructure::Bvh,
     };
-    Aggregate::with_structure(forms, structure)
+    let duplicates = duplicates(scene, forms, materials);
+    Aggregate::with_structure(forms, structure, |form| duplicates.contains(&form))
+}
+
+/// Returns the objects with the shape, the place and the materials of an earlier object, if these
+/// materials are opaque and do not emit. Rays see only the earlier object.
+fn duplicates<S: Float>(
+    scene: &Scene,
+    forms: &[Form],
+    materials: &CompiledMaterials<S>,
+) -> HashSet<usize> {
+    let mut first_at = HashMap::new();
+    let is_duplicate = |i: &usize| {
+        let corners = forms[*i].bounds().map(|(low, high)| [low, high].map(|v| v.to_array()));
+        let bits = corners.map(|corners| corners.map(|corner| corner.map(f64::to_bits)));
+        let first = *first_at.entry(bits).or_insert(*i);
+        let [a, b] = [&scene.objects[first], &scene.objects[*i]];
+        let of_object = &materials.of_object;
+        let is_plain = |m: &u32| {
+            let m = *m as usize;
+            materials.bsdfs[m].transmission.is_none() && !materials.materials[m].emits()
+        };
+        first != *i
+            && a.shape == b.shape
+            && a.transform == b.transform
+            && of_object[first] == of_object[*i]
+            && of_object[*i].iter().all(is_plain)
+    };
+    (0..forms.len()).filter(is_duplicate).collect()
 }
 
 /// Returns a sphere around the eye that contains the lens and every start point on the near plane.
@@ -417,7 +449,7 @@ impl<L: SimdFloat> World<L> {
         materials: CompiledMaterials<L::Scalar>,
         groups: LightGroups,
     ) -> Self {
-        let geometry = aggregate(scene, &recentered.forms);
+        let geometry = aggregate(scene, &recentered.forms, &materials);
         let primitives = &geometry.sources;
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
         let textures = SurfaceTextures::new(scene, primitives, recentered.origin, |id| {
@@ -466,5 +498,31 @@ impl<L: SimdFloat> World<L> {
             camera,
             jitter: scene.film.filter == Filter::Box,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use zerkalo_kernel::lanes::Single;
+
+    /// Checks that equal opaque objects share one test of a ray, and that glass, lamps and other
+    /// materials keep theirs.
+    #[test]
+    fn equal_opaque_objects_are_tested_once() {
+        let spheres = |keys: &str, count: usize| {
+            let sphere = "shape.sphere = { center = [0, 0, 0], radius = 1 }";
+            let object = format!("[[object]]\nmaterial = \"a\"\n{sphere}\n");
+            let other = "[[object]]\nshape.sphere = { center = [9, 0, 0], radius = 1 }\n";
+            let text = format!(
+                "ambient.color = [1, 1, 1]\ntrace.acceleration = \"bvh\"\n[materials.a]\n{keys}\n{}{other}",
+                object.repeat(count)
+            );
+            let world = World::<Single>::new(&Scene::parse(&text, "test").unwrap());
+            world.geometry.in_bvh().len()
+        };
+        assert_eq!(spheres("color = [1, 0, 0]", 100), 2);
+        assert_eq!(spheres("transmission = 0.9\ndiffuse = 0.0", 10), 11);
+        assert_eq!(spheres("emission = 1.0", 10), 11);
     }
 }
