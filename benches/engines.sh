@@ -7,8 +7,8 @@
 #   benches/engines.sh [parallel] [slurm] > benches/runs/DATE-engines.txt
 #
 # It must run as root, in a container or on a spare machine: it starts munged, slurmctld and three slurmd of its own,
-# and ends them. ZERKALO names a program that has been built already. It takes some six minutes on four cores,
-# of which Slurm waits two before it starts a task again.
+# and ends them. ZERKALO names a program that has been built already. It takes eleven minutes on two cores,
+# of which Slurm waits four before it starts tasks again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 [ $# -gt 0 ] || set -- parallel slurm
