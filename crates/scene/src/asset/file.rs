@@ -2,6 +2,7 @@
 //! that occur inside files.
 
 use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::text::Lines;
 use crate::disk::open_regular;
 use crate::process_memory::megabytes;
 use std::fs::File;
@@ -60,6 +61,11 @@ impl FileContents {
         expected: &str,
     ) -> AssetError {
         AssetError { place, ..AssetError::of_file(&self.path, found, expected) }
+    }
+
+    /// Returns the line in which `rest` begins, the end of this file.
+    pub fn line_of(&self, rest: &[u8]) -> FileLocation {
+        FileLocation::Line(Lines::new(&self.bytes[..self.bytes.len() - rest.len()]).count())
     }
 
     /// Creates an error about this file as a whole.

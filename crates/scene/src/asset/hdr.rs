@@ -8,7 +8,7 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use std::borrow::Cow;
+use crate::asset::text::{Lines, numbers, shown, words};
 
 /// Radiance HDR file whose header has been read.
 pub struct HdrFile<'a> {
@@ -34,31 +34,35 @@ struct PixelOrder {
 impl<'a> HdrFile<'a> {
     /// Reads the header of a file whose first line begins with `#?`.
     pub fn parse(source: &'a FileContents) -> Result<Self, AssetError> {
-        let mut lines = Lines { rest: &source.bytes, number: 0 };
-        let end =
-            || source.fault("the header cannot be read: the file ends in it", "a whole image");
-        lines.next().ok_or_else(end)?;
+        let mut lines = Lines::new(&source.bytes);
+        let mut next = || {
+            lines.next().ok_or_else(|| {
+                source.fault("the header cannot be read: the file ends in it", "a whole image")
+            })
+        };
+        next()?;
         let mut factors = [1.0; 3];
         loop {
-            let line = lines.next().ok_or_else(end)?;
+            let (number, line) = next()?;
             if line.is_empty() {
                 break;
             }
-            let line_factors = line_factors(&line).map_err(|(found, expected)| {
-                source.error(FileLocation::Line(lines.number), found, expected)
+            let line_factors = line_factors(line).map_err(|(found, expected)| {
+                source.error(FileLocation::Line(number), found, expected)
             })?;
             factors.iter_mut().zip(line_factors).for_each(|(product, factor)| *product *= factor);
         }
+        let factors = factors.map(|factor| factor as f32);
         let is_valid = |factor: &f32| factor.is_finite() && *factor > 0.0;
         if let Some(factor) = factors.iter().find(|factor| !is_valid(factor)) {
             let found = format!("the exposure of the image is {factor}");
             return Err(source.fault(found, "an exposure above 0"));
         }
-        let line = lines.next().ok_or_else(end)?;
-        let Some((size, order)) = parse_size(&line) else {
-            let found = format!("the size `{}` cannot be read", shortened(&line));
+        let (number, line) = next()?;
+        let Some((size, order)) = parse_size(line) else {
+            let found = format!("the size `{}` cannot be read", shown(line));
             let expected = "`-Y HEIGHT +X WIDTH`, with any signs and in any order";
-            return Err(source.error(FileLocation::Line(lines.number), found, expected));
+            return Err(source.error(FileLocation::Line(number), found, expected));
         };
         Ok(Self { size, order, factors, lines: lines.rest })
     }
@@ -95,75 +99,42 @@ impl<'a> HdrFile<'a> {
 
 /// Returns the factors in red, green and blue by which radiances were multiplied, as a line of the
 /// header states them. Fails with what was found and what was expected.
-fn line_factors(line: &str) -> Result<[f32; 3], (String, &'static str)> {
-    let (key, value) = line.split_once('=').unwrap_or_default();
-    let (key, value) = (key.trim(), value.trim());
-    let numbers: Result<Vec<f32>, _> = value.split_whitespace().map(str::parse).collect();
-    match (key, numbers.as_deref()) {
-        ("FORMAT", _) if ![RGBE, ""].contains(&value) => {
-            let found = format!("the pixels have the format `{}`", shortened(value));
-            Err((found, "the format `32-bit_rle_rgbe`"))
+fn line_factors(line: &[u8]) -> Result<[f64; 3], (String, &'static str)> {
+    let equals = line.iter().position(|byte| *byte == b'=').unwrap_or(line.len());
+    let (key, value) = (line[..equals].trim_ascii(), line[equals..].get(1..).unwrap_or_default());
+    let value = value.trim_ascii();
+    let factors = match key {
+        b"FORMAT" if ![&b"32-bit_rle_rgbe"[..], b""].contains(&value) => {
+            let found = format!("the pixels have the format `{}`", shown(value));
+            return Err((found, "the format `32-bit_rle_rgbe`"));
         }
-        ("EXPOSURE", Ok([exposure, ..])) => Ok([*exposure; 3]),
-        ("COLORCORR", Ok(&[r, g, b, ..])) => Ok([r, g, b]),
-        ("EXPOSURE" | "COLORCORR", _) if !value.is_empty() => {
-            let found = format!("the {key} `{}` cannot be read", shortened(value));
-            Err((found, "1 number for EXPOSURE, 3 for COLORCORR"))
-        }
+        b"EXPOSURE" if !value.is_empty() => numbers(words(value)).map(|[exposure]| [exposure; 3]),
+        b"COLORCORR" if !value.is_empty() => numbers(words(value)),
         // Comments, lines without a value, keys of other programs.
-        _ => Ok([1.0; 3]),
-    }
+        _ => Some([1.0; 3]),
+    };
+    factors.ok_or_else(|| {
+        let found = format!("the {} `{}` cannot be read", shown(key), shown(value));
+        (found, "1 number for EXPOSURE, 3 for COLORCORR")
+    })
 }
 
 /// Reads the line that states size and order of the pixels, such as `-Y 512 +X 1024` for rows from
 /// the top, from left to right. The first axis is that from line to line.
-fn parse_size(line: &str) -> Option<([u32; 2], PixelOrder)> {
-    let words: Vec<&str> = line.split_whitespace().collect();
+fn parse_size(line: &[u8]) -> Option<([u32; 2], PixelOrder)> {
+    let words: Vec<_> = words(line).take(5).collect();
     let [first, count, second, length] = words[..] else { return None };
-    let (count, length) = (count.parse().ok()?, length.parse().ok()?);
-    let by_columns = first.ends_with('X');
+    let number = |word| std::str::from_utf8(word).ok()?.parse().ok();
+    let (count, length) = (number(count)?, number(length)?);
+    let by_columns = first.ends_with(b"X");
     let (x, y) = if by_columns { (first, second) } else { (second, first) };
-    let is_second = |axis: &str, directions: [&str; 2]| {
+    let is_second = |axis, directions: [&[u8]; 2]| {
         directions.iter().position(|direction| *direction == axis).map(|i| i == 1)
     };
-    let from_right = is_second(x, ["+X", "-X"])?;
-    let from_bottom = is_second(y, ["-Y", "+Y"])?;
+    let from_right = is_second(x, [b"+X", b"-X"])?;
+    let from_bottom = is_second(y, [b"-Y", b"+Y"])?;
     let size = if by_columns { [count, length] } else { [length, count] };
     Some((size, PixelOrder { by_columns, from_bottom, from_right }))
-}
-
-/// Value of the header line `FORMAT` for pixels of red, green, blue and exponent.
-const RGBE: &str = "32-bit_rle_rgbe";
-
-/// Largest number of bytes of a header's line that are read.
-const MAX_LINE: usize = 4096;
-
-/// Lines of a header.
-struct Lines<'a> {
-    /// Bytes of the file after the line that was read last.
-    rest: &'a [u8],
-    /// Number of the line that was read last, counted from 1.
-    number: usize,
-}
-
-impl<'a> Lines<'a> {
-    /// Returns the next line, which ends with LF or CR LF. Returns `None` at the end of the file.
-    fn next(&mut self) -> Option<Cow<'a, str>> {
-        if self.rest.is_empty() {
-            return None;
-        }
-        let end = self.rest.iter().position(|byte| *byte == b'\n');
-        let (line, rest) = self.rest.split_at(end.unwrap_or(self.rest.len()));
-        self.rest = rest.get(1..).unwrap_or_default();
-        self.number += 1;
-        let line = line.strip_suffix(b"\r").unwrap_or(line);
-        Some(String::from_utf8_lossy(&line[..line.len().min(MAX_LINE)]))
-    }
-}
-
-/// Returns the beginning of `text`, for an error message.
-fn shortened(text: &str) -> String {
-    text.chars().take(40).collect()
 }
 
 /// Returns the values of mantissa 1 for all exponents: 2^(exponent - 136), but 0 for the exponent 0.

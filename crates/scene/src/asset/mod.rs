@@ -19,6 +19,7 @@ mod memory;
 mod mesh;
 mod primaries;
 mod radiance_map;
+mod text;
 
 pub use cache::{Assets, LoadProgress};
 pub use error::{AssetError, FileLocation};

@@ -6,7 +6,6 @@ mod obj;
 mod ply;
 mod polygon;
 mod stl;
-mod text;
 
 use crate::asset::error::AssetError;
 use crate::asset::file::FileContents;

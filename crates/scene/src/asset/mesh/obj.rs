@@ -1,12 +1,12 @@
-//! Wavefront OBJ files, with the diffuse colours of their MTL files. Points, lines, free-form
-//! surfaces, textures and the colours of vertices are not read.
+//! Wavefront OBJ files with the diffuse colours of their MTL files (material libraries). Points,
+//! lines, free-form surfaces, textures and the colours of vertices are not read.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::builder::{Builder, MAX_COORDINATE};
-use crate::asset::mesh::text::{Lines, number, numbers, shown, words};
+use crate::asset::text::{Lines, numbers, shown, take_word, words};
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use zerkalo_kernel::primitive::TriangleMesh;
 
@@ -29,9 +29,9 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
         uvs: Vec::new(),
         normals: Vec::new(),
         vertices: HashMap::new(),
-        libraries: Vec::new(),
+        libraries: HashSet::new(),
         colors: HashMap::new(),
-        material: None,
+        color: UNCOLORED,
         has_unknown_material: false,
     };
     for (line, text) in LogicalLines(Lines::new(&source.bytes)) {
@@ -56,14 +56,14 @@ struct Parser<'a> {
     positions: Vec<[f64; 3]>,
     uvs: Vec<[f64; 2]>,
     normals: Vec<[f64; 3]>,
-    /// Index in the mesh of each vertex of the present object, group and material.
+    /// Index in the mesh of each vertex.
     vertices: HashMap<Corner, u32>,
     /// MTL files that have been read.
-    libraries: Vec<PathBuf>,
+    libraries: HashSet<PathBuf>,
     /// Diffuse colours of the materials, by name.
     colors: HashMap<Vec<u8>, [f32; 3]>,
-    /// Name of the present material; `None` if no MTL file that has been read defines it.
-    material: Option<Vec<u8>>,
+    /// Colour of the present material.
+    color: [f32; 3],
     has_unknown_material: bool,
 }
 
@@ -91,8 +91,9 @@ impl<'a> Iterator for LogicalLines<'a> {
 
 impl Parser<'_> {
     /// Parses a line and adds its content. Lines with unknown keywords are ignored.
-    fn parse_line(&mut self, line: &[u8]) -> Result<(), AssetError> {
-        let (keyword, rest) = keyword(line);
+    fn parse_line(&mut self, mut line: &[u8]) -> Result<(), AssetError> {
+        let keyword = take_word(&mut line).unwrap_or_default();
+        let rest = line.trim_ascii();
         let values = without_comment(rest);
         match keyword {
             b"v" => {
@@ -106,28 +107,21 @@ impl Parser<'_> {
                 self.positions.push(position);
             }
             b"vt" => {
-                let uv = match words(values).count() {
-                    1 => numbers(values).map(|[u]| [u, 0.0]),
-                    _ => numbers(values),
-                };
+                // The second coordinate is 0 where it is not stated.
+                let uv = numbers(words(values).chain([&b"0"[..]]));
                 self.uvs.push(uv.ok_or_else(|| self.wrong("texture coordinate is not numbers"))?);
             }
             b"vn" => {
-                let wrong = || self.wrong("normal is not three numbers");
-                self.normals.push(numbers(values).ok_or_else(wrong)?);
+                let normal = numbers(words(values));
+                self.normals.push(normal.ok_or_else(|| self.wrong("normal is not three numbers"))?);
             }
             b"f" | b"fo" => self.add_face(values)?,
-            b"o" | b"g" => self.vertices.clear(),
             b"l" | b"p" => self.builder.note("points and lines were left out"),
             b"curv" | b"surf" => self.builder.note("curves and free-form surfaces were left out"),
             b"usemtl" => {
-                let known = [rest, values].into_iter().find(|name| self.colors.contains_key(*name));
-                let material = known.map(<[u8]>::to_vec);
-                if material != self.material {
-                    self.vertices.clear();
-                }
-                self.has_unknown_material |= material.is_none() && !values.is_empty();
-                self.material = material;
+                let color = [rest, values].into_iter().find_map(|name| self.colors.get(name));
+                self.has_unknown_material |= color.is_none() && !values.is_empty();
+                self.color = *color.unwrap_or(&UNCOLORED);
             }
             b"mtllib" => self.read_libraries(rest),
             _ => {}
@@ -147,8 +141,7 @@ impl Parser<'_> {
     /// `1/2/3`.
     fn add_face(&mut self, values: &[u8]) -> Result<(), AssetError> {
         if !self.colors.is_empty() {
-            let color = self.material.as_ref().and_then(|name| self.colors.get(name));
-            self.builder.color(*color.unwrap_or(&UNCOLORED))?;
+            self.builder.color(self.color)?;
         }
         let mut corners = Vec::new();
         for word in words(values) {
@@ -173,14 +166,11 @@ impl Parser<'_> {
         let index = std::str::from_utf8(word).ok().and_then(|word| word.parse::<i64>().ok());
         let index = index.ok_or_else(|| self.wrong("face is not a list of indices"))?;
         let from_0 = if index > 0 { index - 1 } else { index.saturating_add(count as i64) };
-        match usize::try_from(from_0).ok().filter(|i| *i < count) {
-            Some(index) => Ok(Some(index)),
-            None => {
-                let found = format!("the face names {what} {index}");
-                let expected = format!("a {what} above: 1 to {count}, or -{count} to -1 backwards");
-                Err(self.error(found, &expected))
-            }
-        }
+        let found = usize::try_from(from_0).ok().filter(|i| *i < count);
+        found.map(Some).ok_or_else(|| {
+            let expected = format!("a {what} above: 1 to {count}, or -{count} to -1 backwards");
+            self.error(format!("the face names {what} {index}"), &expected)
+        })
     }
 
     /// Returns the index of the vertex `corner` in the mesh. Adds the vertex if it is new.
@@ -196,10 +186,10 @@ impl Parser<'_> {
     /// Parses three coordinates. If exactly one more number follows, it is the weight of the vertex,
     /// by which they are divided. If several follow, they are a colour.
     fn position(&mut self, values: &[u8]) -> Option<[f64; 3]> {
-        let position: [f64; 3] = numbers(values)?;
-        let weight = match words(values).skip(3).count() {
-            0 => 1.0,
-            1 => number(words(values).nth(3)?)?,
+        let position: [f64; 3] = numbers(words(values))?;
+        let weight = match words(values).count() {
+            3 => 1.0,
+            4 => numbers(words(values).skip(3)).map(|[weight]| weight)?,
             _ => {
                 self.builder.note("a colour of a vertex was not read");
                 1.0
@@ -212,66 +202,56 @@ impl Parser<'_> {
     fn read_libraries(&mut self, names: &[u8]) {
         let names = names.strip_prefix(b"\"").unwrap_or(names);
         let names = names.strip_suffix(b"\"").unwrap_or(names);
-        let is_file = |name: &[u8]| {
-            self.source
-                .resolve_relative(&String::from_utf8_lossy(name))
-                .is_some_and(|p| p.is_file())
-        };
-        let words = || words(names).take(MAX_MTL_FILES);
-        let several = !is_file(names) && words().any(is_file);
-        let names: Vec<_> = if several { words().collect() } else { vec![names] };
-        names.into_iter().filter(|name| !name.is_empty()).for_each(|name| self.read_library(name));
+        let path = |name: &[u8]| self.source.resolve_relative(&String::from_utf8_lossy(name));
+        let is_file = |name: &[u8]| path(name).is_some_and(|path| path.is_file());
+        let several: Vec<_> = words(names).take(MAX_MTL_FILES).collect();
+        let is_one = is_file(names) || !several.iter().any(|name| is_file(name));
+        let names = if is_one { vec![names] } else { several };
+        for name in names {
+            match path(name) {
+                _ if name.is_empty() => {}
+                Some(path) if self.libraries.len() < MAX_MTL_FILES => self.read_library(path),
+                Some(_) => {}
+                None => {
+                    let note =
+                        format!("no colours: \"{}\" is not in the mesh's folder", shown(name));
+                    self.builder.note(note);
+                }
+            }
+        }
     }
 
-    /// Reads the diffuse colours of the MTL file `name`. Records a note if the file cannot be read,
-    /// or if its name could lead out of the folder of the OBJ file.
-    fn read_library(&mut self, name: &[u8]) {
-        let Some(path) = self.source.resolve_relative(&String::from_utf8_lossy(name)) else {
-            let name = shown(name);
-            return self
-                .builder
-                .note(format!("no colours: \"{name}\" is not in the mesh's folder"));
-        };
-        if self.libraries.contains(&path) || self.libraries.len() >= MAX_MTL_FILES {
+    /// Reads the diffuse colours (`Kd`) of the MTL file at `path`, unless it has been read.
+    fn read_library(&mut self, path: PathBuf) {
+        if !self.libraries.insert(path.clone()) {
             return;
         }
-        match FileContents::read(&path, MAX_MTL_BYTES) {
-            Ok(library) => self.add_colors(&library.bytes),
-            Err(error) => self.builder.note(format!("no colours: {}", error.what())),
-        }
-        self.libraries.push(path);
-    }
-
-    /// Adds the diffuse colours (`Kd`) in the MTL text `library`.
-    fn add_colors(&mut self, library: &[u8]) {
-        let mut name = Vec::new();
-        for (_, line) in LogicalLines(Lines::new(library)) {
-            match keyword(&line) {
-                (b"newmtl", new) => {
-                    name = new.to_vec();
-                    self.colors.insert(name.clone(), UNCOLORED);
+        let library = match FileContents::read(&path, MAX_MTL_BYTES) {
+            Ok(library) => library,
+            Err(error) => return self.builder.note(format!("no colours: {}", error.what())),
+        };
+        let mut before_first = UNCOLORED;
+        let mut present = &mut before_first;
+        for (_, line) in LogicalLines(Lines::new(&library.bytes)) {
+            let mut values = &line[..];
+            match take_word(&mut values).unwrap_or_default() {
+                b"newmtl" => {
+                    present = self.colors.entry(values.trim_ascii().to_vec()).or_default();
+                    *present = UNCOLORED;
                 }
-                (b"Kd", values) => {
-                    let grey = || numbers(values).map(|[grey]| [grey; 3]);
-                    let color: Option<[f64; 3]> = numbers(values).or_else(grey);
-                    let color = color.filter(|c| c.iter().all(|x| (0.0..=1e6).contains(x)));
-                    match (color, self.colors.get_mut(&name)) {
-                        (Some(color), Some(known)) => *known = color.map(|x| x as f32),
-                        _ => self.builder.note("a colour of a material cannot be read"),
+                b"Kd" => {
+                    let grey = || numbers(words(values)).map(|[grey]| [grey; 3]);
+                    let color: Option<[f64; 3]> = numbers(words(values)).or_else(grey);
+                    match color.filter(|c| c.iter().all(|x| (0.0..=1e6).contains(x))) {
+                        Some(color) => *present = color.map(|x| x as f32),
+                        None => self.builder.note("a colour of a material cannot be read"),
                     }
                 }
-                (b"map_Kd", _) => self.builder.note("a texture of a material was not read"),
+                b"map_Kd" => self.builder.note("a texture of a material was not read"),
                 _ => {}
             }
         }
     }
-}
-
-/// Returns the first word of a line, and the rest without the blanks around it.
-fn keyword(line: &[u8]) -> (&[u8], &[u8]) {
-    let line = line.trim_ascii();
-    let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
-    (&line[..end], line[end..].trim_ascii())
 }
 
 /// Returns the text before a comment, which begins with `#` at the beginning or after a blank.

@@ -1,15 +1,15 @@
-//! PLY files: positions, normals, texture coordinates, polygons and triangle strips, in ASCII and in
-//! binary with both byte orders. Other elements and properties are skipped, whatever their values.
+//! PLY files, ASCII, little-endian or big-endian: positions, normals, texture coordinates, polygons
+//! and triangle strips. Other elements and properties are skipped, whatever their values.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::builder::Builder;
 use crate::asset::mesh::strip;
-use crate::asset::mesh::text::{Lines, number, shown, words};
+use crate::asset::text::{Lines, number, shown, take_word, words};
 use zerkalo_kernel::primitive::TriangleMesh;
 
-/// Names of the properties that are read: position, normal and texture coordinates of a vertex;
-/// vertices of a face or strip; texture coordinates of its corners. Programs write different names.
+/// Names of the properties that are read, several where programs write different ones. The last two
+/// are lists: vertices of a face or strip, and texture coordinates of the corners of a face.
 const PROPERTIES: [&[&[u8]]; 10] = [
     &[b"x"],
     &[b"y"],
@@ -22,11 +22,12 @@ const PROPERTIES: [&[&[u8]]; 10] = [
     &[b"vertex_indices", b"vertex_index"],
     &[b"texcoord"],
 ];
-/// Indices in [`PROPERTIES`] of the two lists.
+/// Indices in [`PROPERTIES`] of the lists.
 const CORNERS: usize = 8;
 const UVS: usize = 9;
 
-/// Values of one vertex, face or strip, in the order of [`PROPERTIES`]; empty where it has none.
+/// Values of one vertex, face or strip, in the order of [`PROPERTIES`]. A list is empty if the file
+/// lacks the property.
 type Record = [Vec<f64>; PROPERTIES.len()];
 
 /// Type of a number: `i`, `u` or `f` for signed, unsigned and floating-point, and the size in bytes.
@@ -36,11 +37,12 @@ type Scalar = (u8, usize);
 struct Property {
     /// Index in [`PROPERTIES`]; `None` if the property is not read.
     index: Option<usize>,
+    /// Type of the length of a list; `None` for a single value.
     length: Option<Scalar>,
     scalar: Scalar,
 }
 
-/// Element of the header: `count` records of the same properties.
+/// Element that the header declares: `count` records with the same properties.
 struct Element<'a> {
     name: &'a [u8],
     count: usize,
@@ -52,8 +54,16 @@ impl Element<'_> {
         self.properties.iter().any(|p| p.index == Some(index))
     }
 
+    fn is_vertex(&self) -> bool {
+        self.name == b"vertex"
+    }
+
+    fn is_strip(&self) -> bool {
+        self.name == b"tristrips"
+    }
+
     fn has_corners(&self) -> bool {
-        [b"face" as &[u8], b"tristrips"].contains(&self.name) && self.has(CORNERS)
+        (self.is_strip() || self.name == b"face") && self.has(CORNERS)
     }
 }
 
@@ -61,69 +71,65 @@ impl Element<'_> {
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let mut builder = Builder::new(source);
     let (begin, elements) = header(source, &mut builder)?;
-    begin.check_elements(&elements)?;
+    let vertices = begin.check_elements(&elements)?;
+    let faces = elements.iter().filter(|e| e.has_corners()).map(|e| e.count).sum();
+    builder.reserve(elements[vertices].count, faces)?;
     // Faces may precede the vertices that they name.
     let mut reader = begin.clone();
-    for element in &elements {
-        if element.name != b"vertex" {
-            reader.read(element, |_, _| Ok(()))?;
-            continue;
-        }
-        builder.reserve(element.count, 0)?;
+    for element in &elements[..=vertices] {
         reader.read(element, |_, record| {
-            let [x, y, z, nx, ny, nz, u, v] = std::array::from_fn(|i| record[i].first().copied());
-            let position = [x, y, z].map(|x| x.unwrap_or(f64::NAN));
-            let single = |x: Option<f64>| x.map(|x| x as f32);
-            let normal = || Some([single(nx)?, single(ny)?, single(nz)?]);
-            builder.vertex(position, normal(), single(u).zip(single(v)).map(|(u, v)| [u, v]));
+            if element.is_vertex() {
+                add_vertex(&mut builder, record);
+            }
             Ok(())
         })?;
-        break;
     }
     let mut reader = begin;
     for element in &elements {
-        match element.has_corners() {
-            true => add_faces(&mut reader, element, &mut builder)?,
-            false => reader.read(element, |_, _| Ok(()))?,
-        }
+        reader.read(element, |n, record| match element.has_corners() {
+            true => add_face(&mut builder, element, n, record),
+            false => Ok(()),
+        })?;
     }
     builder.finish()
 }
 
-/// Reads the faces or strips of `element` and adds their triangles.
-fn add_faces(
-    reader: &mut Reader,
-    element: &Element,
+fn add_vertex(builder: &mut Builder, record: &Record) {
+    let [x, y, z, nx, ny, nz, u, v] = std::array::from_fn(|i| record[i].first().copied());
+    let position = [x, y, z].map(|x| x.unwrap_or(f64::NAN));
+    let single = |x: Option<f64>| x.map(|x| x as f32);
+    let normal = || Some([single(nx)?, single(ny)?, single(nz)?]);
+    builder.vertex(position, normal(), single(u).zip(single(v)).map(|(u, v)| [u, v]));
+}
+
+/// Adds the triangles of record `n` of `element`, a polygon or one or more strips.
+fn add_face(
     builder: &mut Builder,
+    element: &Element,
+    n: usize,
+    record: &Record,
 ) -> Result<(), AssetError> {
-    builder.reserve(0, element.count)?;
-    let is_strip = element.name == b"tristrips";
-    let mut corners = Vec::new();
-    reader.read(element, |n, record| {
-        let place = || FileLocation::Part(format!("{} {n} (from 0)", shown(element.name)));
-        // In strips, -1 ends a strip and begins the next one.
-        for indices in record[CORNERS].split(|i| is_strip && *i < 0.0) {
-            corners.clear();
-            for index in indices {
-                corners.push(builder.index(*index, 0, place)?);
+    let place = || FileLocation::Part(format!("{} {n} (from 0)", shown(element.name)));
+    // In strips, -1 ends a strip and begins the next one.
+    for indices in record[CORNERS].split(|i| element.is_strip() && *i < 0.0) {
+        let corners = indices.iter().map(|index| builder.index(*index, 0, place));
+        let mut corners = corners.collect::<Result<Vec<u32>, _>>()?;
+        if !element.is_strip() {
+            for (corner, uv) in corners.iter_mut().zip(record[UVS].as_chunks().0) {
+                *corner = builder.with_uv(*corner, uv.map(|x| x as f32));
             }
-            if !is_strip {
-                for (corner, uv) in corners.iter_mut().zip(record[UVS].as_chunks().0) {
-                    *corner = builder.with_uv(*corner, uv.map(|x| x as f32));
-                }
-                builder.polygon(&corners)?;
-                continue;
-            }
-            for i in 2..corners.len() {
-                let [a, b, c] = strip(i - 2).map(|i| corners[i]);
-                // Strips repeat corners to continue elsewhere.
-                if a != b && b != c && c != a {
-                    builder.triangle([a, b, c])?;
-                }
+            builder.polygon(&corners)?;
+            continue;
+        }
+        for i in 2..corners.len() {
+            let [a, b, c] = strip(i - 2).map(|i| corners[i]);
+            // Strips repeat corners to continue elsewhere.
+            if a != b && b != c && c != a {
+                builder.triangle([a, b, c])?;
             }
         }
-        Ok(())
-    })
+    }
+    Ok(())
 }
 
 /// Parses the header. Returns a reader of the bytes after it, and the elements up to the last one
@@ -172,15 +178,15 @@ fn header<'a>(
             break;
         }
     }
-    let is_read = |e: &Element| e.name == b"vertex" || e.has_corners();
+    let is_read = |e: &Element| e.is_vertex() || e.has_corners();
     elements.truncate(elements.iter().rposition(is_read).map_or(0, |last| last + 1));
     let encoding = encoding.ok_or_else(|| source.fault("the header names no format", "ascii"))?;
     // Where lines end with CR, the next byte is the first one of the elements, even if it is LF.
-    let begin = source.bytes.len() - lines.rest.len();
-    if source.bytes[..begin].ends_with(b"\r\n") && !source.bytes[..begin - 1].contains(&b'\n') {
-        lines.rest = &source.bytes[begin - 1..];
+    let (header, mut rest) = source.bytes.split_at(source.bytes.len() - lines.rest.len());
+    if header.ends_with(b"\r\n") && !header[..header.len() - 1].contains(&b'\n') {
+        rest = &source.bytes[header.len() - 1..];
     }
-    Ok((Reader { source, encoding, lines, number: 0, line: b"" }, elements))
+    Ok((Reader { source, encoding, rest }, elements))
 }
 
 /// Parses the words after `property`, and returns the property with its name; `None` if they are
@@ -225,23 +231,20 @@ enum Encoding {
 struct Reader<'a> {
     source: &'a FileContents,
     encoding: Encoding,
-    /// Bytes that were not read, in an ASCII file those after the present line.
-    lines: Lines<'a>,
-    /// Number of the present line of an ASCII file, and the rest of it.
-    number: usize,
-    line: &'a [u8],
+    /// Bytes that were not read.
+    rest: &'a [u8],
 }
 
 impl<'a> Reader<'a> {
     /// Checks that the header declares the required elements and properties, and that the file is
-    /// long enough for the declared elements.
-    fn check_elements(&self, elements: &[Element]) -> Result<(), AssetError> {
+    /// long enough for the declared elements. Returns the index of the element `vertex`.
+    fn check_elements(&self, elements: &[Element]) -> Result<usize, AssetError> {
         let missing =
             |what: &str| Err(self.source.fault(format!("the header names no {what}"), "a mesh"));
-        let Some(vertex) = elements.iter().find(|e| e.name == b"vertex") else {
+        let Some(vertices) = elements.iter().position(Element::is_vertex) else {
             return missing("element vertex");
         };
-        if let Some(i) = (0..3).find(|i| !vertex.has(*i)) {
+        if let Some(i) = (0..3).find(|i| !elements[vertices].has(*i)) {
             return missing(&format!("property {} of vertices", ["x", "y", "z"][i]));
         }
         if !elements.iter().any(Element::has_corners) {
@@ -255,17 +258,17 @@ impl<'a> Reader<'a> {
                 Encoding::LittleEndian | Encoding::BigEndian => p.length.unwrap_or(p.scalar).1,
             };
             least += properties.iter().map(bytes).sum::<usize>() as u128 * *count as u128;
-            if least > self.lines.rest.len() as u128 + 1 {
+            if least > self.rest.len() as u128 + 1 {
                 let found = format!("the header declares {count} times {}", shown(name));
                 let found = found + ", more than the file holds";
                 return Err(self.source.fault(found, "as many as there are"));
             }
         }
-        Ok(())
+        Ok(vertices)
     }
 
-    /// Reads all records of `element`. Passes each with its number to `add`. In an ASCII file each
-    /// record begins on a new line; words after its last value are ignored.
+    /// Reads all records of `element`, and passes each with its number to `add`. In an ASCII file
+    /// each record begins on a new line; words after its last value are ignored.
     fn read(
         &mut self,
         element: &Element,
@@ -275,7 +278,6 @@ impl<'a> Reader<'a> {
         // A record without properties takes no bytes.
         let count = if element.properties.is_empty() { 0 } else { element.count };
         for n in 0..count {
-            self.line = b"";
             record.iter_mut().for_each(Vec::clear);
             for Property { index, length, scalar } in &element.properties {
                 let length = length.map_or(Ok(1), |length| self.length(length))?;
@@ -287,6 +289,11 @@ impl<'a> Reader<'a> {
                     }
                 }
             }
+            if self.encoding == Encoding::Ascii {
+                let mut lines = Lines::new(self.rest);
+                lines.next();
+                self.rest = lines.rest;
+            }
             add(n, &record)?;
         }
         Ok(())
@@ -294,9 +301,9 @@ impl<'a> Reader<'a> {
 
     fn error(&self, found: impl Into<String>, expected: &str) -> AssetError {
         let place = match self.encoding {
-            Encoding::Ascii => FileLocation::Line(self.number),
+            Encoding::Ascii => self.source.line_of(self.rest),
             Encoding::LittleEndian | Encoding::BigEndian => {
-                FileLocation::Byte(self.source.bytes.len() - self.lines.rest.len())
+                FileLocation::Byte(self.source.bytes.len() - self.rest.len())
             }
         };
         self.source.error(place, found, expected)
@@ -305,21 +312,22 @@ impl<'a> Reader<'a> {
     /// Reads the length of a list, and checks that the file is long enough for it.
     fn length(&mut self, scalar: Scalar) -> Result<usize, AssetError> {
         let length = self.value(scalar)?;
-        let left = self.line.len() + self.lines.rest.len();
-        (0.0..=left as f64).contains(&length).then_some(length as usize).ok_or_else(|| {
-            let found = format!("a list has {length} values, more than the file holds");
-            self.error(found, "as many as there are")
-        })
+        (0.0..=self.rest.len() as f64).contains(&length).then_some(length as usize).ok_or_else(
+            || {
+                let found = format!("a list has {length} values, more than the file holds");
+                self.error(found, "as many as there are")
+            },
+        )
     }
 
+    /// Reads a number.
     fn value(&mut self, (kind, size): Scalar) -> Result<f64, AssetError> {
         let bytes = self.bytes(size)?;
         let append = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
         let bits = match self.encoding {
             Encoding::Ascii => {
-                let wrong =
-                    || self.error(format!("\"{}\" is not a number", shown(bytes)), "a number");
-                return number(bytes).ok_or_else(wrong);
+                let found = || format!("\"{}\" is not a number", shown(bytes));
+                return number(bytes).ok_or_else(|| self.error(found(), "a number"));
             }
             Encoding::LittleEndian => bytes.iter().rev().fold(0, append),
             Encoding::BigEndian => bytes.iter().fold(0, append),
@@ -335,22 +343,11 @@ impl<'a> Reader<'a> {
 
     /// Returns the bytes of the next value: `size` bytes, in an ASCII file a word.
     fn bytes(&mut self, size: usize) -> Result<&'a [u8], AssetError> {
-        let ends = |reader: &Self| reader.error("the file ends in an element", "a whole file");
-        if self.encoding != Encoding::Ascii {
-            let split = self.lines.rest.split_at_checked(size);
-            let (bytes, rest) = split.ok_or_else(|| ends(self))?;
-            self.lines.rest = rest;
-            return Ok(bytes);
-        }
-        while self.line.trim_ascii_start().is_empty() {
-            let next = self.lines.next();
-            (self.number, self.line) = next.ok_or_else(|| ends(self))?;
-        }
-        let line = self.line.trim_ascii_start();
-        let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
-        let (word, rest) = line.split_at(end);
-        self.line = rest;
-        Ok(word)
+        let bytes = match self.encoding {
+            Encoding::Ascii => take_word(&mut self.rest),
+            Encoding::LittleEndian | Encoding::BigEndian => self.rest.split_off(..size),
+        };
+        bytes.ok_or_else(|| self.error("the file ends in an element", "a whole file"))
     }
 }
 

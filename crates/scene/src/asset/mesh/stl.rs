@@ -1,12 +1,12 @@
-//! STL files, ASCII with any number of solids, and binary. Triangles in this format share no vertices. This module merges
-//! vertices with equal positions, so that normals can be smooth. The normals in the file are
-//! ignored, because they follow from the corners. Colours, which some programs write into the
-//! attributes of binary files, are not read.
+//! STL files: binary, or ASCII with any number of solids. Each triangle states its corners; corners
+//! at one position become one vertex. The normals in the file are ignored, because they follow from
+//! the corners. Colours, which some programs write into the attributes of binary files, are not
+//! read.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::builder::Builder;
-use crate::asset::mesh::text::{Lines, number, words};
+use crate::asset::text::{Lines, numbers, take_word, words};
 use std::collections::HashMap;
 use zerkalo_kernel::primitive::TriangleMesh;
 
@@ -19,90 +19,95 @@ const SAMPLE: usize = 512;
 
 /// Parses an STL file.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
-    let mut parser = Parser { source, builder: Builder::new(source), known: HashMap::new() };
-    let announced =
-        source.bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    let size = announced.map(|count| HEADER as u64 + TRIANGLE as u64 * u64::from(count));
-    let length = source.bytes.len() as u64;
+    let mut parser = Parser { source, builder: Builder::new(source), vertices: HashMap::new() };
+    let bytes = &source.bytes;
+    let text = Lines::new(bytes).rest;
+    let begins_as_text = words(text).next().is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
     // Some binary files begin with `solid` like a text file.
-    let has_zeros = source.bytes.iter().take(SAMPLE).any(|byte| *byte == 0);
-    let first = Lines::new(&source.bytes).find_map(|(_, line)| words(line).next());
-    let is_text = first.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
-    if is_text && size != Some(length) && !has_zeros {
-        parser.parse_text()?;
-        return parser.builder.finish();
+    let has_zeros = bytes.iter().take(SAMPLE).any(|byte| *byte == 0);
+    let has_binary_size = declared(bytes)
+        .is_some_and(|count| HEADER as u64 + TRIANGLE as u64 * count == bytes.len() as u64);
+    match begins_as_text && !has_zeros && !has_binary_size {
+        true => parser.parse_text(text)?,
+        false => parser.parse_binary()?,
     }
-    let (Some(announced), Some(size)) = (announced, size) else {
-        let found = format!("the file has {length} bytes and does not begin with \"solid\"");
-        return Err(source.fault(found, "an STL file"));
-    };
-    if size > length {
-        let found = format!("the header declares {announced} triangles, more than the file holds");
-        let expected = format!("at most {}", (source.bytes.len() - HEADER) / TRIANGLE);
-        return Err(source.error(FileLocation::Byte(80), found, &expected));
-    }
-    parser.parse_binary(announced as usize)?;
     parser.builder.finish()
+}
+
+/// Returns the number of triangles that the header of a binary file declares.
+fn declared(bytes: &[u8]) -> Option<u64> {
+    Some(u32::from_le_bytes(*bytes.get(80..)?.first_chunk()?).into())
 }
 
 struct Parser<'a> {
     source: &'a FileContents,
     builder: Builder<'a>,
     /// Index in the mesh of each vertex, by the bits of its coordinates.
-    known: HashMap<[u32; 3], u32>,
+    vertices: HashMap<[u32; 3], u32>,
 }
 
 impl Parser<'_> {
-    /// Adds the triangles of an ASCII file. Normals and names are ignored. Words may be in any case
-    /// and on any line, and `end` may be a word of its own.
-    fn parse_text(&mut self) -> Result<(), AssetError> {
+    /// Adds the triangles of an ASCII file. Words may be in any case and on any line, and `end` may
+    /// be a word of its own.
+    fn parse_text(&mut self, mut text: &[u8]) -> Result<(), AssetError> {
+        let source = self.source;
         let mut corners: Vec<[f32; 3]> = Vec::new();
-        for (line, text) in Lines::new(&self.source.bytes) {
-            let text = text.to_ascii_lowercase();
-            let mut words = words(&text).peekable();
-            while let Some(word) = words.next() {
-                let wrong = |found: &str| {
-                    self.source.error(FileLocation::Line(line), found, "a line of the STL format")
-                };
-                let word = if word == b"end" { words.next().unwrap_or(b"solid") } else { word };
-                match word {
-                    b"vertex" => {
-                        let mut next = || Some(number(words.next()?)? as f32);
-                        let corner = (|| Some([next()?, next()?, next()?]))();
-                        let wrong = || wrong("this vertex is not three numbers");
-                        corners.push(corner.ok_or_else(wrong)?);
-                    }
-                    b"endfacet" | b"facet" if !corners.is_empty() => {
-                        let Ok(triangle) = std::mem::take(&mut corners).try_into() else {
-                            return Err(wrong("this facet does not have three corners"));
-                        };
-                        self.add(triangle, || FileLocation::Line(line))?;
-                    }
-                    b"normal" => {
-                        words.by_ref().take(3).for_each(drop);
-                    }
-                    // A name may have the word `facet`, but no `normal` after it.
-                    b"solid" | b"endsolid" => {
-                        let facet: [&[u8]; 2] = [b"facet", b"normal"];
-                        while words.peek().is_some() && !words.clone().take(2).eq(facet) {
-                            words.next();
-                        }
-                    }
-                    b"facet" | b"outer" | b"loop" | b"endloop" | b"endfacet" => {}
-                    _ => return Err(wrong("this line cannot be read")),
+        while let Some(word) = take_word(&mut text) {
+            let after = text;
+            let wrong =
+                |found| source.error(source.line_of(after), found, "a line of the STL format");
+            match word.to_ascii_lowercase().as_slice() {
+                b"vertex" => {
+                    let words = std::iter::from_fn(|| take_word(&mut text));
+                    let corner = numbers(words).map(|corner| corner.map(|x| x as f32));
+                    let corner = corner.filter(is_finite);
+                    let found = "this vertex is not three finite numbers";
+                    corners.push(corner.ok_or_else(|| wrong(found))?);
                 }
+                b"endfacet" | b"facet" if !corners.is_empty() => {
+                    let Ok(triangle) = std::mem::take(&mut corners).try_into() else {
+                        return Err(wrong("this facet does not have three corners"));
+                    };
+                    self.add(triangle)?;
+                }
+                b"normal" => {
+                    for _ in 0..3 {
+                        take_word(&mut text);
+                    }
+                }
+                // A name may have the word `facet`, but no `normal` after it.
+                b"solid" | b"endsolid" => {
+                    let (_, name) = Lines::new(text).next().unwrap_or_default();
+                    let is_facet = |words: &[u8]| words.eq_ignore_ascii_case(b"facet normal");
+                    let length = name.windows(12).position(is_facet).unwrap_or(name.len());
+                    text = &text[length..];
+                }
+                b"facet" | b"outer" | b"loop" | b"endloop" | b"endfacet" | b"end" => {}
+                _ => return Err(wrong("this line cannot be read")),
             }
         }
         match corners.is_empty() {
             true => Ok(()),
-            false => Err(self.source.fault("the file ends in a facet", "a whole file")),
+            false => Err(source.fault("the file ends in a facet", "a whole file")),
         }
     }
 
-    fn parse_binary(&mut self, count: usize) -> Result<(), AssetError> {
-        self.builder.check_limits(0, count)?;
-        let triangles = self.source.bytes[HEADER..].chunks_exact(TRIANGLE).take(count);
-        for (n, bytes) in triangles.enumerate() {
+    /// Adds the triangles of a binary file.
+    fn parse_binary(&mut self) -> Result<(), AssetError> {
+        let bytes = &self.source.bytes;
+        let Some(declared) = declared(bytes) else {
+            let found =
+                format!("the file has {} bytes and does not begin with \"solid\"", bytes.len());
+            return Err(self.source.fault(found, "an STL file"));
+        };
+        let triangles = bytes[HEADER..].chunks_exact(TRIANGLE);
+        if declared > triangles.len() as u64 {
+            let found =
+                format!("the header declares {declared} triangles, more than the file holds");
+            let expected = format!("at most {}", triangles.len());
+            return Err(self.source.error(FileLocation::Byte(80), found, &expected));
+        }
+        for (n, bytes) in triangles.take(declared as usize).enumerate() {
             // VisCAM marks a colour by the highest bit of the attribute.
             if bytes[49] & 0x80 != 0 {
                 self.builder.note("a colour of a triangle was not read");
@@ -111,29 +116,29 @@ impl Parser<'_> {
             let numbers = bytes[12..48].as_chunks().0.iter().map(|b| f32::from_le_bytes(*b));
             let numbers: Vec<f32> = numbers.collect();
             let corners = [0, 3, 6].map(|i| [numbers[i], numbers[i + 1], numbers[i + 2]]);
-            self.add(corners, || FileLocation::Part(format!("triangle {n} (from 0)")))?;
+            if !corners.iter().all(is_finite) {
+                let place = FileLocation::Part(format!("triangle {n} (from 0)"));
+                return Err(self.source.error(place, "a corner is not finite", "finite numbers"));
+            }
+            self.add(corners)?;
         }
         Ok(())
     }
 
     /// Adds a triangle. A corner becomes the vertex with its position, or a new vertex.
-    fn add(
-        &mut self,
-        corners: [[f32; 3]; 3],
-        place: impl Fn() -> FileLocation,
-    ) -> Result<(), AssetError> {
-        if corners.iter().flatten().any(|x| !x.is_finite()) {
-            return Err(self.source.error(place(), "a corner is not finite", "finite coordinates"));
-        }
-        self.builder.check_limits(3, 1)?;
+    fn add(&mut self, corners: [[f32; 3]; 3]) -> Result<(), AssetError> {
         let corners = corners.map(|position| {
             // +0 and -0 are the same position.
             let key = position.map(|x| if x == 0.0 { 0 } else { x.to_bits() });
             let vertex = || self.builder.vertex(position.map(f64::from), None, None);
-            *self.known.entry(key).or_insert_with(vertex)
+            *self.vertices.entry(key).or_insert_with(vertex)
         });
         self.builder.triangle(corners)
     }
+}
+
+fn is_finite(corner: &[f32; 3]) -> bool {
+    corner.iter().all(|x| x.is_finite())
 }
 
 #[cfg(test)]
@@ -231,7 +236,9 @@ mod tests {
         let error = read(&binary(&[[0.0; 12]], 4_000_000_000)).unwrap_err();
         assert!(error.found.contains("4000000000 triangles"), "{error}");
         let error = read(&binary(&[[f32::NAN; 12]], 1)).unwrap_err();
-        assert!(error.found.contains("not finite"), "{error}");
+        assert!(
+            error.to_string().starts_with("a.stl, triangle 0 (from 0): a corner is not finite")
+        );
         assert!(read(b"solid").is_err() && read(b"").is_err() && read(&[0; 84]).is_err());
     }
 }

@@ -1,4 +1,4 @@
-//! Text of mesh files. The formats are older than UTF-8: their lines and names are bytes.
+//! Text in asset files. The formats are older than UTF-8: their lines and names are bytes.
 
 /// Lines of a text, each with its number, counted from 1. A line ends with LF, CRLF or CR. A byte
 /// order mark at the beginning is skipped.
@@ -32,9 +32,22 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// Returns the words of a line, between blanks.
-pub fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
-    line.split(|byte| byte.is_ascii_whitespace() || *byte == 0x0B).filter(|word| !word.is_empty())
+fn is_blank(byte: &u8) -> bool {
+    byte.is_ascii_whitespace() || *byte == 0x0B
+}
+
+/// Removes the first word of `text`, between blanks and ends of lines, and returns it.
+pub fn take_word<'a>(text: &mut &'a [u8]) -> Option<&'a [u8]> {
+    let begin = text.iter().position(|byte| !is_blank(byte))?;
+    let length = text[begin..].iter().position(is_blank).unwrap_or(text.len() - begin);
+    let (word, rest) = text[begin..].split_at(length);
+    *text = rest;
+    Some(word)
+}
+
+/// Returns the words of `text`.
+pub fn words(mut text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    std::iter::from_fn(move || take_word(&mut text))
 }
 
 /// Returns the number that `word` is in the syntax of C. NaN and infinity have the names that C
@@ -52,13 +65,14 @@ pub fn number(word: &[u8]) -> Option<f64> {
 }
 
 /// Returns the first `N` words as numbers; `None` if there are fewer words or one is not a number.
-pub fn numbers<const N: usize>(line: &[u8]) -> Option<[f64; N]> {
-    words(line).take(N).map(number).collect::<Option<Vec<_>>>()?.try_into().ok()
+pub fn numbers<'a, const N: usize>(words: impl Iterator<Item = &'a [u8]>) -> Option<[f64; N]> {
+    words.take(N).map(number).collect::<Option<Vec<_>>>()?.try_into().ok()
 }
 
-/// Returns a text for messages.
-pub fn shown(bytes: &[u8]) -> String {
-    crate::value::truncated(&String::from_utf8_lossy(bytes)).to_string()
+/// Returns the beginning of a text, for messages.
+pub fn shown(text: &[u8]) -> String {
+    let beginning = String::from_utf8_lossy(&text[..text.len().min(1000)]);
+    crate::value::truncated(&beginning)
 }
 
 #[cfg(test)]
@@ -95,7 +109,8 @@ mod tests {
         for word in ["", "x", "1x", "1,5", "--1", "\u{e9}"] {
             assert_eq!(number(word.as_bytes()), None, "{word}");
         }
-        assert_eq!(numbers(b" 1\t2  x"), Some([1.0, 2.0]));
-        assert_eq!(numbers::<3>(b"1 2"), None);
+        assert_eq!(numbers(words(b" 1\t2  x")), Some([1.0, 2.0]));
+        assert_eq!(numbers::<3>(words(b"1 2")), None);
+        assert_eq!(words(b"\x0Ba \tb\r\n c").collect::<Vec<_>>(), [b"a", b"b", b"c"]);
     }
 }
