@@ -1,7 +1,6 @@
 //! glTF 2.0 files, text and binary. All primitives are merged into one mesh, with the transforms of
-//! their nodes, skins, morph weights and instances applied. Positions, normals, texture coordinates
-//! and base colour factors are read, from quantised and sparse accessors, too. Everything else is
-//! ignored, even if it is faulty.
+//! their nodes, skins and morph weights applied. Positions, normals, texture coordinates and base
+//! colour factors are read. Everything else is ignored, even if it is faulty.
 
 mod document;
 
@@ -9,28 +8,34 @@ use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES};
 use crate::asset::mesh::builder::Builder;
 use crate::asset::mesh::gltf::document::{
-    Attributes, Document, Instances, Material, Node, Primitive, Sparse, View, whole,
+    Attributes, Document, Material, Node, Primitive, Sparse, View, whole,
 };
 use crate::asset::mesh::strip;
 use crate::process_memory::missing_memory;
 use crate::value::truncated;
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use glam::{DAffine3, DMat4, DQuat, DVec3};
-use std::borrow::Cow;
+use glam::{DAffine3, DMat4, DVec3};
 use std::cell::{Cell, OnceCell};
 use std::collections::HashSet;
 use std::fmt::{Arguments, Display};
 use zerkalo_kernel::primitive::TriangleMesh;
 
-/// Parts of the names of extensions that change neither the shape nor the colours that are read.
-const HARMLESS: [&str; 7] =
-    ["_materials_", "_texture_", "_lights_", "_xmp", "_animation_", "_features", "_metadata"];
+/// Parts of the names of extensions without which a file is read.
+const OPTIONAL: [&str; 8] = [
+    "_materials_",
+    "_texture_",
+    "_lights_",
+    "_xmp",
+    "_animation_",
+    "_features",
+    "_metadata",
+    "_instancing",
+];
 
 /// Extensions that are applied, or refused where they occur.
-const KNOWN: [&str; 5] = [
+const KNOWN: [&str; 4] = [
     "KHR_mesh_quantization",
-    "EXT_mesh_gpu_instancing",
     "KHR_draco_mesh_compression",
     "EXT_meshopt_compression",
     "KHR_meshopt_compression",
@@ -61,26 +66,20 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let mut builder = Builder::new(source);
     builder.is_flat = true;
     gltf.check_extensions(&mut builder)?;
-    let (order, scene_from_node) = gltf.transforms()?;
-    for index in order {
-        let node = &gltf.document.nodes[index];
-        let Some(m) = node.mesh else { continue };
-        let mesh = gltf.part(&gltf.document.meshes, m, format_args!("meshes[{m}]"))?;
-        let weights = node.weights.as_ref().or(mesh.weights.as_ref());
-        let weights = weights.map_or(&[][..], Vec::as_slice);
+    let scene_from_node = gltf.transforms()?;
+    for (node, map) in gltf.document.nodes.iter().zip(&scene_from_node) {
+        let (Some(map), Some(m)) = (map, node.mesh) else { continue };
+        if node.extensions.instances.is_some() {
+            builder.note("the instances of a node were not read");
+        }
+        let mesh = gltf.part(&gltf.document.meshes, "meshes", m)?;
+        let weights = if node.weights.is_empty() { &mesh.weights } else { &node.weights };
         let joints = gltf.joints(node, &scene_from_node)?;
-        // The joints alone place a mesh with a skin.
-        let maps = match &joints {
-            Some(_) => vec![DAffine3::IDENTITY],
-            None => gltf.instances(node)?.into_iter().map(|m| scene_from_node[index] * m).collect(),
-        };
-        for map in maps {
-            gltf.count(mesh.primitives.len())?;
-            for (i, primitive) in mesh.primitives.iter().enumerate() {
-                let place = format_args!("meshes[{m}].primitives[{i}]");
-                let joints = joints.as_deref();
-                Part { gltf: &gltf, primitive, place, weights, joints }.add(&mut builder, map)?;
-            }
+        gltf.count(mesh.primitives.len())?;
+        for (i, primitive) in mesh.primitives.iter().enumerate() {
+            let place = format_args!("meshes[{m}].primitives[{i}]");
+            let joints = joints.as_deref();
+            Part { gltf: &gltf, primitive, place, weights, joints }.add(&mut builder, *map)?;
         }
     }
     builder.finish()
@@ -92,9 +91,9 @@ struct Gltf<'a> {
     document: Document,
     /// Binary chunk of a GLB file.
     blob: Option<&'a [u8]>,
-    /// Bytes of the buffers that were read so far.
-    buffers: Vec<OnceCell<Cow<'a, [u8]>>>,
-    /// Number of bytes that were read from other files and data URLs.
+    /// Bytes of the buffers that were read so far from other files and data URLs.
+    buffers: Vec<OnceCell<Vec<u8>>>,
+    /// Number of these bytes.
     bytes_read: Cell<u64>,
     /// Number of items of lists and accessors that were read.
     items_read: Cell<u64>,
@@ -141,16 +140,12 @@ impl<'a> Gltf<'a> {
         is_allowed.then_some(()).ok_or_else(|| self.source.fault(message, "a smaller scene"))
     }
 
-    /// Returns the element of `list` that `index` names; `place` is the name of that element.
-    fn part<'b, T>(
-        &self,
-        list: &'b [T],
-        index: f64,
-        place: impl Display,
-    ) -> Result<&'b T, AssetError> {
+    /// Returns the element `index` of the list `name`.
+    fn part<'b, T>(&self, list: &'b [T], name: &str, index: f64) -> Result<&'b T, AssetError> {
         list.get(whole(index)).ok_or_else(|| {
             let expected = format!("one of the {} elements of that list", list.len());
-            self.error(place, "the file names this part, which it lacks", &expected)
+            let found = "the file names this part, which it lacks";
+            self.error(format_args!("{name}[{index}]"), found, &expected)
         })
     }
 
@@ -158,7 +153,7 @@ impl<'a> Gltf<'a> {
     fn check_extensions(&self, builder: &mut Builder) -> Result<(), AssetError> {
         for name in &self.document.extensions_required {
             let shown = truncated(name);
-            if HARMLESS.iter().any(|part| name.contains(part)) {
+            if OPTIONAL.iter().any(|part| name.contains(part)) {
                 builder.note(format!("the extension {shown} was not applied"));
             } else if !KNOWN.contains(&name.as_str()) {
                 let found = format!("the file requires the extension \"{shown}\"");
@@ -168,207 +163,181 @@ impl<'a> Gltf<'a> {
         Ok(())
     }
 
-    /// Returns the nodes of the scene, parents first, and the transform of each node of the file.
-    /// The scene is the default one, or else the first one; without scenes it has all nodes.
-    fn transforms(&self) -> Result<(Vec<usize>, Vec<DAffine3>), AssetError> {
-        let nodes = &self.document.nodes;
-        let roots = match self.document.scene.or(self.document.scenes.first().map(|_| 0.0)) {
-            Some(scene) => self
-                .part(&self.document.scenes, scene, format_args!("scenes[{scene}]"))?
-                .nodes
-                .clone(),
+    /// Returns the transform of each node of the scene; `None` for other nodes. The scene is the
+    /// default one, or else the first one; without scenes it has all nodes.
+    fn transforms(&self) -> Result<Vec<Option<DAffine3>>, AssetError> {
+        let Document { nodes, scene, scenes, .. } = &self.document;
+        let roots = match scene.or(scenes.first().map(|_| 0.0)) {
+            Some(scene) => self.part(scenes, "scenes", scene)?.nodes.clone(),
             None => {
                 let children = nodes.iter().flat_map(|n| &n.children).map(|i| whole(*i));
                 let children: HashSet<usize> = children.collect();
                 (0..nodes.len()).filter(|i| !children.contains(i)).map(|i| i as f64).collect()
             }
         };
-        let mut order = Vec::new();
-        let mut scene_from_node = vec![DAffine3::IDENTITY; nodes.len()];
-        let mut is_known = vec![false; nodes.len()];
-        let mut stack: Vec<_> = roots.iter().rev().map(|i| (*i, DAffine3::IDENTITY)).collect();
+        let mut scene_from_node = vec![None; nodes.len()];
+        let mut stack: Vec<_> = roots.into_iter().map(|root| (root, DAffine3::IDENTITY)).collect();
         while let Some((index, outer)) = stack.pop() {
-            let place = format_args!("nodes[{index}]");
-            let node = self.part(nodes, index, place)?;
-            let i = whole(index);
-            if std::mem::replace(&mut is_known[i], true) {
-                return Err(self.error(place, "the node has two parents", "a tree of nodes"));
-            }
+            let node = self.part(nodes, "nodes", index)?;
+            let error =
+                |found, expected| Err(self.error(format_args!("nodes[{index}]"), found, expected));
             let map = outer * node.map();
             if !map.is_finite() {
-                return Err(self.error(place, "the transform is not finite", "finite numbers"));
+                return error("the transform is not finite", "finite numbers");
             }
-            scene_from_node[i] = map;
-            order.push(i);
-            stack.extend(node.children.iter().rev().map(|child| (*child, map)));
+            if scene_from_node[whole(index)].replace(map).is_some() {
+                return error("the node has two parents", "a tree of nodes");
+            }
+            stack.extend(node.children.iter().map(|child| (*child, map)));
         }
-        Ok((order, scene_from_node))
+        Ok(scene_from_node)
     }
 
     /// Returns the maps of the joints of a node's skin; `None` without a skin.
     fn joints(
         &self,
         node: &Node,
-        scene_from_node: &[DAffine3],
+        scene_from_node: &[Option<DAffine3>],
     ) -> Result<Option<Vec<DAffine3>>, AssetError> {
         let Some(skin) = node.skin else { return Ok(None) };
-        let place = format_args!("skins[{skin}]");
-        let skin = self.part(&self.document.skins, skin, place)?;
+        let skin = self.part(&self.document.skins, "skins", skin)?;
         self.count(skin.joints.len())?;
         let matrices = match skin.inverse_bind_matrices {
             Some(accessor) => self.numbers::<16>(accessor)?,
             None => Vec::new(),
         };
         let joint = |(i, joint): (usize, &f64)| {
-            let map = *self.part(scene_from_node, *joint, place)?;
+            let map = self.part(scene_from_node, "nodes", *joint)?.unwrap_or(DAffine3::IDENTITY);
             let matrix = matrices.get(i).map(DMat4::from_cols_array);
             Ok(map * matrix.map_or(DAffine3::IDENTITY, DAffine3::from_mat4))
         };
         skin.joints.iter().enumerate().map(joint).collect::<Result<_, _>>().map(Some)
     }
 
-    /// Returns the maps of a node's instances (`EXT_mesh_gpu_instancing`), one without them.
-    fn instances(&self, node: &Node) -> Result<Vec<DAffine3>, AssetError> {
-        let Some(Instances { attributes }) = &node.extensions.instances else {
-            return Ok(vec![DAffine3::IDENTITY]);
-        };
-        let translations = self.attribute::<3>(attributes, "TRANSLATION")?.unwrap_or_default();
-        let rotations = self.attribute::<4>(attributes, "ROTATION")?.unwrap_or_default();
-        let scales = self.attribute::<3>(attributes, "SCALE")?.unwrap_or_default();
-        let count = translations.len().max(rotations.len()).max(scales.len());
-        let map = |i| {
-            let rotation = rotations.get(i).copied().unwrap_or(DQuat::IDENTITY.to_array());
-            DAffine3::from_scale_rotation_translation(
-                scales.get(i).copied().unwrap_or([1.0; 3]).into(),
-                DQuat::from_array(rotation).normalize(),
-                translations.get(i).copied().unwrap_or([0.0; 3]).into(),
-            )
-        };
-        Ok((0..count).map(map).collect())
-    }
-
-    /// Returns the attribute `name`; `None` if the file lacks it.
+    /// Returns the attribute `name`; empty if the file lacks it.
     fn attribute<const N: usize>(
         &self,
         attributes: &Attributes,
         name: &str,
-    ) -> Result<Option<Vec<[f64; N]>>, AssetError> {
-        attributes.get(name).map(|accessor| self.numbers(*accessor)).transpose()
+    ) -> Result<Vec<[f64; N]>, AssetError> {
+        attributes.get(name).map_or(Ok(Vec::new()), |accessor| self.numbers(*accessor))
     }
 
     /// Returns the elements of an accessor of vectors of `N` numbers.
     fn numbers<const N: usize>(&self, index: f64) -> Result<Vec<[f64; N]>, AssetError> {
-        let place = format_args!("accessors[{index}]");
-        let accessor = self.part(&self.document.accessors, index, place)?;
-        let kind = [(1, "SCALAR"), (2, "VEC2"), (3, "VEC3"), (4, "VEC4"), (16, "MAT4")];
-        let kind = kind.into_iter().find(|(n, _)| *n == N).map_or("", |(_, kind)| kind);
+        let accessor = self.part(&self.document.accessors, "accessors", index)?;
+        let error =
+            |found, expected| Err(self.error(format_args!("accessors[{index}]"), found, expected));
+        let kind = match N {
+            1 => "SCALAR",
+            2 => "VEC2",
+            3 => "VEC3",
+            4 => "VEC4",
+            _ => "MAT4",
+        };
         if accessor.kind != kind {
-            let found = format!("the type is \"{}\"", truncated(&accessor.kind));
-            return Err(self.error(place, found, kind));
+            return error(format!("the type is \"{}\"", truncated(&accessor.kind)), kind);
         }
         let (count, component_type) = (whole(accessor.count), accessor.component_type);
         self.count(count)?;
         let mut all: Vec<[f64; N]> = match accessor.buffer_view {
             Some(buffer_view) => {
                 let byte_offset = accessor.byte_offset;
-                let items =
-                    self.items(&View { buffer_view, byte_offset, component_type }, N, count)?;
-                (0..count).map(|i| items.get(i)).collect()
+                self.items(&View { buffer_view, byte_offset, component_type }, count)?
             }
             // All elements are 0. There are as many as in other accessors, which have data.
             None if count.saturating_mul(N) as u64 <= self.total_bytes() => vec![[0.0; N]; count],
-            None => {
-                let found = format!("there are {count} items without data");
-                return Err(self.error(place, found, "a bufferView"));
-            }
+            None => return error(format!("there are {count} items without data"), "a bufferView"),
         };
         if let Some(Sparse { count, indices, values }) = &accessor.sparse {
-            let count = whole(*count);
-            let indices = self.items(indices, 1, count)?;
-            let values = self.items(&View { component_type, ..*values }, N, count)?;
-            for i in 0..count {
-                let [index] = indices.get(i);
-                let found = || format!("a sparse index is {index}");
-                let beyond = || self.error(place, found(), "an index of the accessor");
-                *all.get_mut(whole(index)).ok_or_else(beyond)? = values.get(i);
+            let indices = self.items::<1>(indices, whole(*count))?;
+            let values = self.items(&View { component_type, ..*values }, whole(*count))?;
+            for ([index], value) in indices.into_iter().zip(values) {
+                match all.get_mut(whole(index)) {
+                    Some(element) => *element = value,
+                    None => {
+                        let found = format!("a sparse index is {index}");
+                        return error(found, "an index of the accessor");
+                    }
+                }
             }
         }
         if accessor.normalized
-            && let Some((_, largest)) = component_of(component_type)
+            && let Some(Component { one, .. }) = Component::of(component_type)
         {
-            all.as_flattened_mut().iter_mut().for_each(|x| *x = (*x / largest).max(-1.0));
+            all.as_flattened_mut().iter_mut().for_each(|x| *x = (*x / one).max(-1.0));
         }
         Ok(all)
     }
 
-    /// Returns `count` items of `n` components in a buffer view. Checks that they lie in the view
+    /// Returns `count` items of `N` components in a buffer view. Checks that they lie in the view
     /// and in its buffer.
-    fn items(&self, at: &View, n: usize, count: usize) -> Result<Items<'_>, AssetError> {
-        let place = format_args!("bufferViews[{}]", at.buffer_view);
-        let view = self.part(&self.document.buffer_views, at.buffer_view, place)?;
-        if view.extensions.meshopt.is_some() {
-            let found = "the data is compressed (EXT_meshopt_compression)";
-            return Err(self.error(place, found, "a file without compression"));
-        }
-        let component = at.component_type;
-        let Some((width, _)) = component_of(component) else {
-            let found = format!("a componentType is {component}");
-            return Err(self.error(place, found, "5120 to 5123, 5125 or 5126"));
+    fn items<const N: usize>(&self, at: &View, count: usize) -> Result<Vec<[f64; N]>, AssetError> {
+        let view = self.part(&self.document.buffer_views, "bufferViews", at.buffer_view)?;
+        let error = |found: String, expected| {
+            self.error(format_args!("bufferViews[{}]", at.buffer_view), found, expected)
         };
-        let size = n * width;
-        let stride = view.byte_stride.map_or(size, whole);
+        if view.extensions.meshopt.is_some() {
+            let found = "the data is compressed (EXT_meshopt_compression)".to_string();
+            return Err(error(found, "a file without compression"));
+        }
+        let Some(Component { size, value, .. }) = Component::of(at.component_type) else {
+            let found = format!("a componentType is {}", at.component_type);
+            return Err(error(found, "5120 to 5123, 5125 or 5126"));
+        };
+        let stride = view.byte_stride.map_or(N * size, whole);
         let buffer = self.buffer(view.buffer)?;
         let bytes = || {
             let [begin, length, offset] =
                 [view.byte_offset, view.byte_length, at.byte_offset].map(whole);
             let view = buffer.get(begin..begin.checked_add(length)?)?;
-            let items = count.checked_sub(1)?.checked_mul(stride)?.checked_add(size)?;
-            view.get(offset..offset.checked_add(items)?).filter(|_| stride >= size)
+            let items = count.checked_sub(1)?.checked_mul(stride)?.checked_add(N * size)?;
+            view.get(offset..offset.checked_add(items)?).filter(|_| stride >= N * size)
         };
-        bytes().map(|bytes| Items { bytes, stride, width, component }).ok_or_else(|| {
-            let found = format!("{count} items of {size} bytes do not lie in their buffer");
-            let expected = "a range inside its bufferView and buffer, with at least one item";
-            self.error(place, found, expected)
-        })
+        let bytes = bytes().ok_or_else(|| {
+            let found = format!("{count} items of {} bytes do not lie in their buffer", N * size);
+            error(found, "a range inside its bufferView and buffer, with at least one item")
+        })?;
+        let component = |bytes: &[u8]| {
+            let mut word = [0; 4];
+            word[..size].copy_from_slice(bytes);
+            value(u32::from_le_bytes(word))
+        };
+        let item =
+            |bytes: &[u8]| std::array::from_fn(|k| component(&bytes[k * size..(k + 1) * size]));
+        Ok(bytes.chunks(stride).map(item).collect())
     }
 
     /// Returns the bytes of a buffer: the binary chunk, a data URL, or a file in the folder of the
     /// glTF file.
     fn buffer(&self, index: f64) -> Result<&[u8], AssetError> {
-        let place = format_args!("buffers[{index}]");
-        let buffer = self.part(&self.document.buffers, index, place)?;
+        let buffer = self.part(&self.document.buffers, "buffers", index)?;
+        let error =
+            |found: &str, expected| self.error(format_args!("buffers[{index}]"), found, expected);
+        let Some(uri) = &buffer.uri else {
+            return self
+                .blob
+                .ok_or_else(|| error("the buffer has no data", "a uri or a BIN chunk"));
+        };
         let cell = &self.buffers[whole(index)];
         if let Some(bytes) = cell.get() {
             return Ok(bytes);
         }
-        let wrong = |found: &str, expected: &str| self.error(place, found, expected);
-        let bytes: Cow<[u8]> =
-            match buffer.uri.as_deref().map(|uri| (uri, uri.strip_prefix("data:"))) {
-                None => Cow::Borrowed(
-                    self.blob
-                        .ok_or_else(|| wrong("the buffer has no data", "a uri or a BIN chunk"))?,
-                ),
-                Some((_, Some(data))) => {
-                    let text = data.split_once(";base64,").map(|(_, text)| unescaped(text));
-                    let bytes = text.and_then(|text| BASE64.decode(text).ok());
-                    Cow::Owned(bytes.ok_or_else(|| wrong("the data is not base64", "base64"))?)
-                }
-                Some((uri, None)) => {
-                    let name = String::from_utf8_lossy(&unescaped(uri)).into_owned();
-                    let path = self.source.resolve_relative(&name).ok_or_else(|| {
-                        let found = format!("uri is \"{}\"", truncated(uri));
-                        wrong(
-                            &found,
-                            "a relative path without \"..\", to a file in the same folder or below",
-                        )
-                    })?;
-                    let limit = MAX_BYTES - self.bytes_read.get();
-                    Cow::Owned(FileContents::read(&path, limit)?.bytes)
-                }
-            };
-        if matches!(bytes, Cow::Owned(_)) {
-            self.bytes_read.set(self.bytes_read.get() + bytes.len() as u64);
-        }
+        let bytes = if let Some(data) = uri.strip_prefix("data:") {
+            let text = data.split_once(";base64,").map(|(_, text)| unescaped(text));
+            let bytes = text.and_then(|text| BASE64.decode(text).ok());
+            bytes.ok_or_else(|| error("the data is not base64", "base64"))?
+        } else {
+            let name = unescaped(uri);
+            let path = self.source.resolve_relative(&String::from_utf8_lossy(&name));
+            let path = path.ok_or_else(|| {
+                let expected =
+                    "a relative path without \"..\", to a file in the same folder or below";
+                error(&format!("uri is \"{}\"", truncated(uri)), expected)
+            })?;
+            FileContents::read(&path, MAX_BYTES.saturating_sub(self.bytes_read.get()))?.bytes
+        };
+        self.bytes_read.set(self.bytes_read.get() + bytes.len() as u64);
         Ok(cell.get_or_init(|| bytes))
     }
 
@@ -377,41 +346,28 @@ impl<'a> Gltf<'a> {
     }
 }
 
-/// Returns the size in bytes of a component type, and the number that is 1 if it is normalised.
-fn component_of(component: f64) -> Option<(usize, f64)> {
-    Some(match component as u32 {
-        5120 => (1, 127.0),
-        5121 => (1, 255.0),
-        5122 => (2, 32767.0),
-        5123 => (2, 65535.0),
-        5125 => (4, 4_294_967_295.0),
-        5126 => (4, 1.0),
-        _ => return None,
-    })
+/// Type of the numbers of an accessor.
+struct Component {
+    /// Size in bytes.
+    size: usize,
+    /// Number that stands for 1 if the accessor is normalised.
+    one: f64,
+    /// Returns the number with the given bits.
+    value: fn(u32) -> f64,
 }
 
-/// Items of a buffer view, which begin every `stride` bytes. Each component has `width` bytes.
-struct Items<'a> {
-    bytes: &'a [u8],
-    stride: usize,
-    width: usize,
-    component: f64,
-}
-
-impl Items<'_> {
-    fn get<const N: usize>(&self, i: usize) -> [f64; N] {
-        std::array::from_fn(|k| {
-            let bytes = &self.bytes[i * self.stride + k * self.width..][..self.width];
-            let mut word = [0; 4];
-            word[..self.width].copy_from_slice(bytes);
-            let bits = u32::from_le_bytes(word);
-            match self.component as u32 {
-                5120 => (bits as i8).into(),
-                5122 => (bits as i16).into(),
-                5126 => f32::from_bits(bits).into(),
-                _ => bits.into(),
-            }
-        })
+impl Component {
+    fn of(code: f64) -> Option<Self> {
+        let (size, one, value): (_, _, fn(u32) -> f64) = match code as u32 {
+            5120 => (1, 127.0, |bits| (bits as i8).into()),
+            5121 => (1, 255.0, f64::from),
+            5122 => (2, 32767.0, |bits| (bits as i16).into()),
+            5123 => (2, 65535.0, f64::from),
+            5125 => (4, 4_294_967_295.0, f64::from),
+            5126 => (4, 1.0, |bits| f32::from_bits(bits).into()),
+            _ => return None,
+        };
+        Some(Self { size, one, value })
     }
 }
 
@@ -468,8 +424,8 @@ struct Part<'a, 'b> {
 }
 
 impl Part<'_, '_> {
-    /// Adds vertices, colour and triangles of this part, placed by `map`. Leaves out points and
-    /// lines.
+    /// Adds vertices, colour and triangles of this part, placed by `map` or by its joints alone.
+    /// Leaves out points and lines.
     fn add(&self, builder: &mut Builder, map: DAffine3) -> Result<(), AssetError> {
         let Primitive { attributes, extensions, mode, indices, .. } = self.primitive;
         if extensions.draco.is_some() {
@@ -481,14 +437,13 @@ impl Part<'_, '_> {
             builder.note("points and lines were left out");
             return Ok(());
         }
-        let Some(mut positions) = self.gltf.attribute::<3>(attributes, "POSITION")? else {
+        let positions = self.morphed("POSITION")?;
+        let normals = self.morphed("NORMAL")?;
+        if positions.is_empty() {
             builder.note("a part without positions was left out");
             return Ok(());
-        };
-        let mut normals = self.gltf.attribute::<3>(attributes, "NORMAL")?.unwrap_or_default();
-        self.morph("POSITION", &mut positions)?;
-        self.morph("NORMAL", &mut normals)?;
-        let uvs = self.gltf.attribute::<2>(attributes, "TEXCOORD_0")?.unwrap_or_default();
+        }
+        let uvs = self.gltf.attribute::<2>(attributes, "TEXCOORD_0")?;
         let skin = self.skin(positions.len())?;
         self.add_color(builder)?;
         let indices = indices.map(|a| self.gltf.numbers::<1>(a)).transpose()?;
@@ -521,16 +476,17 @@ impl Part<'_, '_> {
         Ok(())
     }
 
-    /// Adds the morph targets to the attribute `name`, each with its weight.
-    fn morph(&self, name: &str, values: &mut [[f64; 3]]) -> Result<(), AssetError> {
+    /// Returns the attribute `name` with the sum of its morph targets, each with its weight.
+    fn morphed(&self, name: &str) -> Result<Vec<[f64; 3]>, AssetError> {
+        let mut values = self.gltf.attribute::<3>(&self.primitive.attributes, name)?;
         let targets = self.primitive.targets.iter().zip(self.weights);
         for (target, weight) in targets.filter(|(_, weight)| **weight != 0.0) {
-            let shifts = self.gltf.attribute::<3>(target, name)?.unwrap_or_default();
+            let shifts = self.gltf.attribute::<3>(target, name)?;
             for (value, shift) in values.as_flattened_mut().iter_mut().zip(shifts.as_flattened()) {
                 *value += weight * shift;
             }
         }
-        Ok(())
+        Ok(values)
     }
 
     /// Returns the map of each vertex: the mean of the maps of its joints, by their weights. Empty
@@ -538,14 +494,16 @@ impl Part<'_, '_> {
     fn skin(&self, vertices: usize) -> Result<Vec<DAffine3>, AssetError> {
         let Some(joints) = self.joints else { return Ok(Vec::new()) };
         let mut sums = vec![DAffine3::ZERO; vertices];
-        let attributes = &self.primitive.attributes;
+        let attribute = |name: String| self.gltf.attribute::<4>(&self.primitive.attributes, &name);
         for set in 0.. {
-            let indices = self.gltf.attribute::<4>(attributes, &format!("JOINTS_{set}"))?;
-            let weights = self.gltf.attribute::<4>(attributes, &format!("WEIGHTS_{set}"))?;
-            let (Some(indices), Some(weights)) = (indices, weights) else { break };
+            let indices = attribute(format!("JOINTS_{set}"))?;
+            let weights = attribute(format!("WEIGHTS_{set}"))?;
+            if indices.is_empty() || weights.is_empty() {
+                break;
+            }
             for ((sum, indices), weights) in sums.iter_mut().zip(indices).zip(weights) {
                 for (joint, weight) in indices.into_iter().zip(weights).filter(|(_, w)| *w != 0.0) {
-                    let map = self.gltf.part(joints, joint, self.place)?;
+                    let map = self.gltf.part(joints, "joints", joint)?;
                     sum.matrix3 += map.matrix3 * weight;
                     sum.translation += map.translation * weight;
                 }
@@ -560,11 +518,8 @@ impl Part<'_, '_> {
         if self.primitive.attributes.contains_key("COLOR_0") {
             builder.note("the colours of the vertices of a part were not read");
         }
-        let document = &self.gltf.document;
         let material = match self.primitive.material {
-            Some(index) => {
-                self.gltf.part(&document.materials, index, format_args!("materials[{index}]"))?
-            }
+            Some(index) => self.gltf.part(&self.gltf.document.materials, "materials", index)?,
             None => &Material::default(),
         };
         let surface = &material.pbr_metallic_roughness;
@@ -788,6 +743,7 @@ mod tests {
             "KHR_lights_punctual",
             "KHR_xmp_json_ld",
             "EXT_structural_metadata",
+            "EXT_mesh_gpu_instancing",
         ] {
             let mut changed = file.clone();
             changed["extensionsRequired"] = json!([name]);
@@ -891,6 +847,7 @@ mod tests {
         file["meshes"][0]["primitives"][0]["material"] = json!(0);
         let texture = json!({"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0, 0, 1]});
         file["materials"] = json!([{"pbrMetallicRoughness": texture}]);
+        file["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": 9}});
         let copy = file["meshes"][0]["primitives"][0].clone();
         file["meshes"][0]["primitives"].as_array_mut().unwrap().push(copy);
         file["meshes"][0]["primitives"].as_array_mut().unwrap().push(json!({"mode": 1}));
@@ -899,6 +856,7 @@ mod tests {
         assert_eq!(
             mesh.notes,
             [
+                "the instances of a node were not read",
                 "the colours of the vertices of a part were not read (2 times)",
                 "the base colour texture of a part was not read (2 times)",
                 "points and lines were left out"
@@ -907,14 +865,13 @@ mod tests {
     }
 
     #[test]
-    fn gltf_skins_morphs_and_instances_are_applied() {
+    fn gltf_skins_and_morphs_are_applied() {
         let (mut parts, _) = square();
         let shift = parts.accessor(5126, &SQUARE);
         let joints = parts.accessor(5121, &[&[0.0, 1.0, 0.0, 0.0] as &[f64]; 4]);
         let weights = parts.accessor(5126, &[&[0.25, 0.75, 0.0, 0.0] as &[f64]; 4]);
         let to = |x: f64| DMat4::from_translation(DVec3::new(x, 0.0, 0.0)).to_cols_array();
         let inverse = parts.accessor(5126, &[&to(-1.0)[..], &to(-2.0)]);
-        let places = parts.accessor(5126, &[&[0.0, 0.0, 0.0], &[0.0, 0.0, 5.0]]);
         let file = parts.file(json!({"POSITION": 0, "JOINTS_0": joints, "WEIGHTS_0": weights}));
         let bounds = |change: &dyn Fn(&mut Value)| {
             let mut file = file.clone();
@@ -942,12 +899,6 @@ mod tests {
             };
             assert_eq!(bounds(&morphed), [[0.0, 7.0, 0.0], [size, 7.0 + size, 0.0]], "{list}");
         }
-        let instanced = |file: &mut Value| {
-            let attributes = json!({"attributes": {"TRANSLATION": places}});
-            file["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": attributes});
-            file["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
-        };
-        assert_eq!(bounds(&instanced), [[0.0, 7.0, 0.0], [1.0, 8.0, 5.0]]);
     }
 
     #[test]

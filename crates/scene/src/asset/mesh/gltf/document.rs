@@ -34,11 +34,11 @@ objects! {
     Asset { version: String }
     Scene { nodes: Vec<f64> }
     Node {
-        children: Vec<f64>, mesh: Option<f64>, skin: Option<f64>, weights: Option<Vec<f64>>,
+        children: Vec<f64>, mesh: Option<f64>, skin: Option<f64>, weights: Vec<f64>,
         matrix: Option<Box<[f64; 16]>>, translation: Option<[f64; 3]>,
         rotation: Option<[f64; 4]>, scale: Option<[f64; 3]>, extensions: Extensions
     }
-    Mesh { primitives: Vec<Primitive>, weights: Option<Vec<f64>> }
+    Mesh { primitives: Vec<Primitive>, weights: Vec<f64> }
     Primitive {
         attributes: Attributes, indices: Option<f64>, material: Option<f64>, mode: Option<f64>,
         targets: Vec<Attributes>, extensions: Extensions
@@ -62,12 +62,11 @@ objects! {
     Buffer { uri: Option<String> }
     /// Extensions of nodes, primitives and buffer views.
     Extensions {
-        #[serde(rename = "EXT_mesh_gpu_instancing")] instances: Option<Instances>,
+        #[serde(rename = "EXT_mesh_gpu_instancing")] instances: Option<IgnoredAny>,
         #[serde(rename = "KHR_draco_mesh_compression")] draco: Option<IgnoredAny>,
         #[serde(rename = "EXT_meshopt_compression", alias = "KHR_meshopt_compression")]
         meshopt: Option<IgnoredAny>
     }
-    Instances { attributes: Attributes }
 }
 
 impl Node {
