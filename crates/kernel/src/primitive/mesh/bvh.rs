@@ -3,7 +3,8 @@
 
 use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
 use crate::primitive::canonical::Bounds;
-use crate::primitive::mesh::{CornerNormals, TriangleMesh, creased};
+use crate::primitive::mesh::normals::creased;
+use crate::primitive::mesh::{CornerNormals, TriangleMesh};
 use glam::DVec3;
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};

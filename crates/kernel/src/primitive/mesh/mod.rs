@@ -6,7 +6,7 @@ pub mod intersection;
 mod normals;
 
 pub use bvh::{Mesh, TriangleBlock};
-pub use normals::{CornerNormals, creased};
+pub use normals::CornerNormals;
 
 /// Triangle mesh that was checked: it has at least one triangle, all indices are in range, all
 /// numbers are finite, and every triangle has an area.

@@ -22,7 +22,11 @@ const NEIGHBORS: usize = 3;
 ///
 /// Vertices with equal positions count as one, so that shading is smooth where a mesh is cut only
 /// for its texture coordinates.
-pub fn creased(positions: &[[f32; 3]], triangles: &[[u32; 3]], degrees: f64) -> CornerNormals {
+pub(super) fn creased(
+    positions: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    degrees: f64,
+) -> CornerNormals {
     // The tolerance is the rounding error of normals in single precision. At 180 degrees there is no
     // crease.
     let least = degrees.to_radians().cos() - 1e-6;
@@ -37,11 +41,10 @@ pub fn creased(positions: &[[f32; 3]], triangles: &[[u32; 3]], degrees: f64) -> 
     };
     let mut sides: Vec<_> = corners.clone().map(side).collect();
     sides.sort_unstable();
-    let normal = |corner: u32| {
-        let p = triangles[corner as usize / 3]
-            .map(|i| DVec3::from(positions[i as usize].map(f64::from)));
-        unit((p[1] - p[0]).cross(p[2] - p[0]))
+    let points = |triangle: usize| {
+        triangles[triangle].map(|i| DVec3::from(positions[i as usize].map(f64::from)))
     };
+    let normal = |corner: u32| normal(points(corner as usize / 3));
     // Forest of the corners that share a normal.
     let mut parent: Vec<u32> = corners.clone().collect();
     for (i, (low, high, first)) in sides.iter().enumerate() {
@@ -59,10 +62,12 @@ pub fn creased(positions: &[[f32; 3]], triangles: &[[u32; 3]], degrees: f64) -> 
         }
     }
     let mut sums = vec![DVec3::ZERO; parent.len()];
-    for (t, corner) in triangles.iter().zip((0..).step_by(3)) {
-        for (normal, corner) in weighted_normals(positions, t).into_iter().zip(corner..) {
-            sums[root(&mut parent, corner) as usize] += normal;
-        }
+    for corner in corners.clone() {
+        let p = points(corner as usize / 3);
+        let [at, next, last] = [0, 1, 2].map(|k| p[(corner as usize + k) % 3]);
+        let (a, b) = (next - at, last - at);
+        let angle = a.cross(b).length().atan2(a.dot(b));
+        sums[root(&mut parent, corner) as usize] += angle * normal(corner);
     }
     // The root of a tree is its lowest corner, so that it gets its index first.
     let mut normals = Vec::new();
@@ -94,16 +99,9 @@ fn welded(positions: &[[f32; 3]]) -> Vec<u32> {
     positions.iter().zip(0u32..).map(|(p, i)| *first.entry(key(p)).or_insert(i)).collect()
 }
 
-/// Returns the normal of a triangle, multiplied by the triangle's angle at each corner.
-fn weighted_normals(positions: &[[f32; 3]], triangle: &[u32; 3]) -> [DVec3; 3] {
-    let p = triangle.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
-    let normal = unit((p[1] - p[0]).cross(p[2] - p[0]));
-    [0, 1, 2].map(|k| {
-        let a = p[(k + 1) % 3] - p[k];
-        let b = p[(k + 2) % 3] - p[k];
-        let angle = a.cross(b).length().atan2(a.dot(b));
-        angle * normal
-    })
+/// Returns the unit normal of a triangle.
+fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+    unit((b - a).cross(c - a))
 }
 
 /// Returns `v` scaled to length 1, or the z axis if the length of `v` is 0.

@@ -3,11 +3,10 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::{CREASE_ANGLE, MAX_TRIANGLES, MAX_VERTICES, polygon};
+use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, polygon};
 use glam::DVec3;
 use std::collections::HashMap;
 use zerkalo_kernel::primitive::TriangleMesh;
-use zerkalo_kernel::primitive::mesh::creased;
 
 /// Largest absolute value of a mesh coordinate.
 pub const MAX_COORDINATE: f64 = 1e9;
@@ -98,12 +97,14 @@ impl<'a> Builder<'a> {
     /// Records a note for the user about a part of the file that was omitted or replaced.
     /// Repetitions are counted.
     pub fn note(&mut self, note: impl Into<String>) {
-        let note = note.into();
-        let found = self.notes.iter_mut().find(|(known, _)| *known == note);
-        if let Some((_, count)) = found {
-            *count += 1;
-        } else if self.notes.len() < MAX_NOTES {
-            self.notes.push((note, 1));
+        self.note_times(note.into(), 1);
+    }
+
+    fn note_times(&mut self, note: String, times: usize) {
+        if let Some((_, count)) = self.notes.iter_mut().find(|(known, _)| *known == note) {
+            *count += times;
+        } else if times > 0 && self.notes.len() < MAX_NOTES {
+            self.notes.push((note, times));
         }
     }
 
@@ -193,30 +194,28 @@ impl<'a> Builder<'a> {
 
     /// Adds a polygon of any shape in a plane as triangles.
     pub fn polygon(&mut self, corners: &[u32]) -> Result<(), AssetError> {
-        let position = |i: &u32| DVec3::from(self.positions[*i as usize]);
-        let division = match corners.len() {
-            0..=2 => {
-                self.note("a face of fewer than three corners was left out");
-                None
-            }
-            4..=polygon::MAX_CORNERS => {
-                polygon::divide(&corners.iter().map(position).collect::<Vec<_>>())
-            }
-            _ => None,
-        };
-        if corners.len() > polygon::MAX_CORNERS || division.as_ref().is_some_and(|d| !d.is_exact) {
-            self.note("a polygon whose outline crosses itself or is too long is uncertain");
-        }
-        if let Some(division) = division {
-            for triangle in division.triangles {
-                self.triangle(triangle.map(|i| corners[i]))?;
-            }
+        if corners.len() < 3 {
+            self.note("a face of fewer than three corners was left out");
             return Ok(());
         }
-        for pair in corners.get(1..).unwrap_or_default().windows(2) {
-            self.triangle([corners[0], pair[0], pair[1]])?;
+        let is_long = corners.len() > polygon::MAX_CORNERS;
+        let position = |i: &u32| DVec3::from(self.positions[*i as usize]);
+        let division = match corners.len() == 3 || is_long {
+            true => None,
+            false => polygon::divide(&corners.iter().map(position).collect::<Vec<_>>()),
+        };
+        if is_long || division.as_ref().is_some_and(|division| !division.is_exact) {
+            self.note("a polygon whose outline crosses itself or is too long is uncertain");
         }
-        Ok(())
+        match division {
+            Some(division) => division
+                .triangles
+                .into_iter()
+                .try_for_each(|triangle| self.triangle(triangle.map(|i| corners[i]))),
+            None => corners[1..]
+                .windows(2)
+                .try_for_each(|pair| self.triangle([corners[0], pair[0], pair[1]])),
+        }
     }
 
     /// Checks the mesh and returns it as a [`TriangleMesh`], without the triangles whose area is 0.
@@ -242,8 +241,8 @@ impl<'a> Builder<'a> {
             let found = format!("the mesh is {extent:e} large");
             return Err(source.fault(found, "a size from 1e-9 to 1e9"));
         }
-        let normals = self.unit_normals(&mut positions);
-        let uvs = self.checked_uvs(positions.len());
+        let mut uvs = self.checked_uvs(positions.len());
+        let normals = self.unit_normals(&mut positions, &mut uvs);
         self.triangles.shrink_to_fit();
         let color_of = if self.colors.len() > 1 { self.color_of } else { Vec::new() };
         Ok(TriangleMesh {
@@ -263,15 +262,11 @@ impl<'a> Builder<'a> {
     /// Checks that all coordinates are finite and within ±[`MAX_COORDINATE`].
     fn coordinates(&self) -> Result<(), AssetError> {
         let bad = |p: &[f64; 3]| p.iter().any(|x| !(-MAX_COORDINATE..=MAX_COORDINATE).contains(x));
-        match self.positions.iter().position(bad) {
-            None => Ok(()),
-            Some(i) => {
-                let [x, y, z] = self.positions[i];
-                let place = FileLocation::Part(format!("vertex {i} (from 0)"));
-                let found = format!("a vertex lies at [{x}, {y}, {z}]");
-                Err(self.source.error(place, found, "coordinates from -1e9 to 1e9"))
-            }
-        }
+        let Some(i) = self.positions.iter().position(bad) else { return Ok(()) };
+        let [x, y, z] = self.positions[i];
+        let place = FileLocation::Part(format!("vertex {i} (from 0)"));
+        let found = format!("a vertex lies at [{x}, {y}, {z}]");
+        Err(self.source.error(place, found, "coordinates from -1e9 to 1e9"))
     }
 
     /// Returns the point that is subtracted from all positions before they are converted to single
@@ -299,52 +294,44 @@ impl<'a> Builder<'a> {
             let found = format!("none of the {before} triangles has an area");
             return Err(self.source.fault(found, "at least one that has"));
         }
-        if dropped > 0 {
-            self.notes.push(("a triangle without area was left out".to_string(), dropped));
-        }
+        self.note_times("a triangle without area was left out".to_string(), dropped);
         Ok(())
     }
 
-    /// Returns a unit normal for each vertex; `None` if no vertex has a normal in the file. Triangles
-    /// at vertices without one get new vertices there, with computed normals.
-    fn unit_normals(&mut self, positions: &mut Vec<[f32; 3]>) -> Option<Vec<[f32; 3]>> {
+    /// Returns a unit normal for each vertex; `None` if no vertex has a normal in the file. Corners
+    /// of triangles that have no normal become vertices with the normal of their triangle.
+    fn unit_normals(
+        &mut self,
+        positions: &mut Vec<[f32; 3]>,
+        uvs: &mut Option<Vec<[f32; 2]>>,
+    ) -> Option<Vec<[f32; 3]>> {
         const MISSING: [f32; 3] = [0.0; 3];
-        let mut normals = std::mem::take(&mut self.normals);
-        normals.resize(positions.len(), MISSING);
-        for n in &mut normals {
-            let normal = DVec3::from(n.map(f64::from));
-            let unit = normal / normal.length();
-            *n = if unit.is_finite() { unit.as_vec3().to_array() } else { MISSING };
-        }
+        let unit = |v: DVec3| v.normalize_or_zero().as_vec3().to_array();
+        let normals = std::mem::take(&mut self.normals);
+        let normals = normals.into_iter().map(|n| unit(DVec3::from(n.map(f64::from))));
+        let mut normals: Vec<_> = normals.collect();
+        let vertices = positions.len();
+        normals.resize(vertices, MISSING);
         if normals.iter().all(|n| *n == MISSING) {
             return None;
         }
-        if self.triangles.as_flattened().iter().any(|i| normals[*i as usize] == MISSING) {
-            let degrees = if self.is_flat { 0.0 } else { CREASE_ANGLE };
-            let computed = creased(positions, &self.triangles, degrees);
-            let corners = computed.corners.as_flattened();
-            let mut copies = HashMap::new();
-            for (vertex, corner) in self.triangles.as_flattened_mut().iter_mut().zip(corners) {
+        for triangle in &mut self.triangles {
+            let [a, b, c] = triangle.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
+            for vertex in triangle {
                 let i = *vertex as usize;
                 if normals[i] != MISSING {
                     continue;
                 }
-                *vertex = *copies.entry((i, *corner)).or_insert_with(|| {
-                    if let Some(uv) = self.uvs.get(i).copied() {
-                        self.uvs.resize(positions.len(), [0.0; 2]);
-                        self.uvs.push(uv);
-                    }
-                    positions.push(positions[i]);
-                    normals.push(computed.normals[*corner as usize]);
-                    (positions.len() - 1) as u32
-                });
-            }
-            if !self.is_flat {
-                self.notes
-                    .push(("a normal that is missing was computed".to_string(), copies.len()));
+                *vertex = positions.len() as u32;
+                positions.push(positions[i]);
+                normals.push(unit((b - a).cross(c - a)));
+                uvs.iter_mut().for_each(|uvs| uvs.push(uvs[i]));
             }
         }
-        normals.iter_mut().filter(|n| **n == MISSING).for_each(|n| *n = [0.0, 0.0, 1.0]);
+        if !self.is_flat {
+            let computed = normals.len() - vertices;
+            self.note_times("a normal that is missing was computed".to_string(), computed);
+        }
         Some(normals)
     }
 
@@ -357,10 +344,8 @@ impl<'a> Builder<'a> {
         }
         let unknown = uvs.iter_mut().filter(|uv| !uv.iter().all(|x| x.is_finite()));
         let unknown = unknown.map(|uv| *uv = [0.0; 2]).count();
-        if unknown > 0 {
-            let note = "texture coordinates that are no numbers were replaced by 0".to_string();
-            self.notes.push((note, unknown));
-        }
+        let note = "texture coordinates that are no numbers were replaced by 0".to_string();
+        self.note_times(note, unknown);
         uvs.resize(vertices, [0.0; 2]);
         Some(uvs)
     }
