@@ -12,7 +12,7 @@ use exr::meta::attribute::{Chromaticities, EnvironmentMap, Text};
 use exr::meta::header::Header;
 use exr::prelude::traits::*;
 use glam::DMat3;
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 use std::io::Cursor;
 
 const EXPECTED: &str = "one layer that is not deep, with the channels R, G and B, or Y alone, as `exrheader` shows them";
@@ -52,8 +52,13 @@ impl ExrFile {
         for header in reader.headers() {
             limit(header.layer_size)?;
         }
-        let (layer, channels) =
-            choose(reader.headers()).map_err(|found| source.fault(found, EXPECTED))?;
+        let (layer, channels) = choose(reader.headers()).ok_or_else(|| {
+            let names = reader.headers().iter().flat_map(|header| &header.channels.list);
+            let names = names.map(|channel| truncated(&channel.name.to_string()));
+            let names: Vec<_> = names.take(12).collect();
+            let found = format!("no layer has one set of R, G and B: {}", names.join(", "));
+            source.fault(found, EXPECTED)
+        })?;
         let header = &reader.headers()[layer];
         let window = header.shared_attributes.display_window;
         let size = limit(window.size)?;
@@ -119,59 +124,46 @@ impl ExrFile {
     }
 }
 
-/// Set of channels of an image: number of the layer, prefix of the names, names.
-type Set = (usize, String, Channels);
+/// Chooses the channels R, G and B of the first layer that has them, or else Y. Returns the number of
+/// the layer, too.
+fn choose(headers: &[Header]) -> Option<(usize, Channels)> {
+    let layers = || headers.iter().enumerate().filter(|(_, header)| !header.deep);
+    let colors = |(layer, header)| {
+        find(header, ["r", "g", "b"], &[]).map(|names| (layer, Channels::Colors(names)))
+    };
+    let grey = |(layer, header): (usize, &Header)| {
+        // Beside channels of other colour spaces, or components of vectors, Y is not grey.
+        let [name] = find(header, ["y"], &["x", "z", "ry", "by"])?;
+        // The decoder takes the first layer that has a channel of this name.
+        let has_name = |header: &Header| header.channels.find_index_of_channel(&name).is_some();
+        let is_first = !headers[..layer].iter().any(has_name);
+        is_first.then_some((layer, Channels::Grey(name)))
+    };
+    layers().find_map(colors).or_else(|| layers().find_map(grey))
+}
 
-/// Chooses the channels of the image: R, G and B of the first layer that has them; otherwise the only
-/// set of such channels after a prefix, or the only one named `Combined`, as Blender names the
-/// picture; otherwise Y in the same way. Case has no influence. Fails with a clause about the channels
-/// that were found.
-fn choose(headers: &[Header]) -> Result<(usize, Channels), String> {
-    let (mut colors, mut greys) = (Vec::new(), Vec::new());
-    let (mut others, mut all) = (Vec::new(), Vec::new());
-    for (layer, header) in headers.iter().enumerate().filter(|(_, header)| !header.deep) {
-        let mut names = BTreeMap::new();
-        for channel in &header.channels.list {
-            names.entry(channel.name.to_string().to_lowercase()).or_insert(&channel.name);
-        }
-        for (name, text) in &names {
-            let (prefix, letter) = name.split_at(name.rfind('.').map_or(0, |dot| dot + 1));
-            let find = |letter: &str| names.get(&format!("{prefix}{letter}"));
-            // Beside channels of other colour spaces, or components of vectors, Y is not grey.
-            let is_alone = || ["x", "z", "ry", "by"].into_iter().all(|o| find(o).is_none());
-            match (letter, find("g"), find("b")) {
-                ("r", Some(green), Some(blue)) => {
-                    let channels = Channels::Colors([text, green, blue].map(|t| Text::clone(t)));
-                    colors.push((layer, prefix.to_string(), channels));
-                }
-                // The decoder takes the first layer that has a channel of this name.
-                ("y", ..) if !is_alone() => others.push(*text),
-                ("y", ..) if !others.contains(text) => {
-                    greys.push((layer, prefix.to_string(), Channels::Grey(Text::clone(text))));
-                }
-                _ => {}
-            }
-        }
-        all.extend(names.into_keys());
+/// Returns the channels with the given letters, without those in `excluded` beside them. Their names
+/// have no prefix such as `ViewLayer.Combined.`, or it is the only one in the layer. Case has no
+/// influence.
+fn find<const N: usize>(
+    header: &Header,
+    letters: [&str; N],
+    excluded: &[&str],
+) -> Option<[Text; N]> {
+    let mut names = HashMap::new();
+    for channel in &header.channels.list {
+        names.entry(channel.name.to_string().to_lowercase()).or_insert(&channel.name);
     }
-    let sets = if colors.is_empty() { greys } else { colors };
-    let only = |is_chosen: fn(&Set) -> bool| {
-        let mut chosen = sets.iter().filter(|set| is_chosen(set));
-        chosen.next().filter(|_| chosen.next().is_none())
+    let get = |prefix: &str, letter: &str| names.get(&format!("{prefix}{letter}"));
+    let with_prefix = |prefix: &str| {
+        let is_alone = excluded.iter().all(|letter| get(prefix, letter).is_none());
+        let channels =
+            letters.iter().map(|letter| get(prefix, letter).map(|name| Text::clone(name)));
+        channels.collect::<Option<Vec<_>>>().filter(|_| is_alone)?.try_into().ok()
     };
-    let plain = sets.iter().find(|(_, prefix, _)| prefix.is_empty());
-    let chosen = plain.or_else(|| only(|_| true));
-    if let Some((layer, _, channels)) =
-        chosen.or_else(|| only(|(_, prefix, _)| prefix.ends_with("combined.")))
-    {
-        return Ok((*layer, channels.clone()));
-    }
-    let (found, names) = match sets.is_empty() {
-        true => ("no layer has the channels R, G and B without deep data", all),
-        false => ("several layers have colours", sets.into_iter().map(|set| set.1).collect()),
-    };
-    let listed: Vec<String> = names.iter().take(12).map(|name| truncated(name)).collect();
-    Err(format!("{found}: {}", listed.join(", ")))
+    let prefixes = names.keys().filter_map(|name| name.strip_suffix(letters[0]));
+    let mut others = prefixes.filter(|prefix| prefix.ends_with('.')).filter_map(with_prefix);
+    with_prefix("").or_else(|| others.next().filter(|_| others.next().is_none()))
 }
 
 fn block_bytes(header: &Header) -> u64 {
@@ -309,22 +301,16 @@ mod tests {
             (&[&["Y", "A"]], Ok([0, 0, 0])),
             (&[&["V.Combined.R", "V.Combined.G", "V.Combined.B"]], Ok([0, 1, 2])),
             (&[&["V.Depth.Z", "V.Combined.R", "V.Combined.G", "V.Combined.B"]], Ok([1, 2, 3])),
-            (
-                &[&["D.R", "D.G", "D.B", "V.Combined.R", "V.Combined.G", "V.Combined.B"]],
-                Ok([3, 4, 5]),
-            ),
+            (&[&["d.R", "d.G", "V.Combined.R", "V.Combined.G", "V.Combined.B"]], Ok([2, 3, 4])),
             (&[&["a.r", "a.g", "a.b", "R", "G", "B"]], Ok([3, 4, 5])),
             (&[&["X", "Y", "Z"], &["R", "G", "B"]], Ok([0, 1, 2])),
             (&[&["Z"], &["l.Y"]], Ok([0, 0, 0])),
-            (&[&["X", "Y", "Z"], &["Y"]], Err("no layer has the channels R, G and B")),
-            (&[&["X", "Y", "Z"]], Err("no layer has the channels R, G and B")),
-            (&[&["Y", "RY", "BY"]], Err("without deep data: by, ry, y")),
-            (&[&["R", "G"]], Err("without deep data: g, r")),
+            (&[&["X", "Y", "Z"], &["Y"]], Err("no layer has one set")),
+            (&[&["X", "Y", "Z"]], Err("no layer has one set")),
+            (&[&["Y", "RY", "BY"]], Err("R, G and B: BY, RY, Y")),
+            (&[&["R", "G"]], Err("R, G and B: G, R")),
             (&[&["a.R", "a.G", "b.B"]], Err("no layer has")),
-            (
-                &[&["a.R", "a.G", "a.B", "b.R", "b.G", "b.B"]],
-                Err("several layers have colours: a., b."),
-            ),
+            (&[&["a.R", "a.G", "a.B", "b.R", "b.G", "b.B"]], Err("R, G and B: a.B, a.G, a.R, b.B")),
         ] {
             let pictures = layers.iter().map(|names| layer(names, Encoding::SMALL_LOSSLESS));
             let pixels = read_pixels(bytes_of(pictures.collect()));
