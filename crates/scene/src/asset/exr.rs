@@ -19,13 +19,12 @@ const EXPECTED: &str = "one layer that is not deep, with the channels R, G and B
 
 /// OpenEXR file whose headers have been read.
 pub struct ExrFile {
-    /// Width and height of the image in pixels.
+    /// Width and height of the display window in pixels.
     pub size: [u32; 2],
     /// Memory \[bytes\] of a row of blocks, which the decoder allocates before it reads them.
     pub block_bytes: u64,
     channels: Channels,
-    /// Size of the display window, and the position of the layer in it.
-    window: Vec2<usize>,
+    /// Position of the layer in the display window.
     offset: Vec2<i32>,
     /// Matrix to linear sRGB from the primaries of the file; `None` if they are those of sRGB.
     pub srgb_from_primaries: Option<DMat3>,
@@ -77,7 +76,6 @@ impl ExrFile {
             size,
             block_bytes: block_bytes(header),
             channels,
-            window: window.size,
             offset: header.own_attributes.layer_position - window.position,
             srgb_from_primaries,
         })
@@ -86,7 +84,7 @@ impl ExrFile {
     /// Decodes the pixels of the display window, row by row from the top. Pixels outside the layer
     /// are black.
     pub fn pixels(&self, source: &FileContents) -> Result<Vec<[f32; 3]>, AssetError> {
-        let (Vec2(width, height), offset) = (self.window, self.offset);
+        let ([width, height], offset) = (self.size.map(|n| n as usize), self.offset);
         let set = move |pixels: &mut Vec<[f32; 3]>, position: Vec2<usize>, color: [f32; 3]| {
             let Vec2(x, y) = position.to_i32() + offset;
             if let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y))

@@ -26,20 +26,19 @@ impl FileContents {
     pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
         let error = |found: String, expected: &str| Err(AssetError::of_file(path, found, expected));
         let file = open(path)?;
-        let metadata = file.metadata().map_err(|e| read_error(path, &e))?;
-        if metadata.len() > limit {
-            let found = format!("the file has {} MiB", metadata.len() >> 20);
-            return error(found, &format!("at most {} MiB", limit >> 20));
-        }
+        let length = file.metadata().map_err(|e| read_error(path, &e))?.len();
         let mut bytes = Vec::new();
-        if bytes.try_reserve_exact(metadata.len() as usize + 1).is_err() {
-            let found = format!("there is no memory for its {}", megabytes(metadata.len()));
-            return error(found, "a smaller file, or more free memory");
+        if length <= limit {
+            if bytes.try_reserve_exact(length as usize + 1).is_err() {
+                let found = format!("there is no memory for its {}", megabytes(length));
+                return error(found, "a smaller file, or more free memory");
+            }
+            // Up to one byte more than `limit` is read, to notice that the file has grown.
+            file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| read_error(path, &e))?;
         }
-        // Up to one byte more than `limit` is read, to notice that the file has grown beyond it.
-        file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| read_error(path, &e))?;
-        if bytes.len() as u64 > limit {
-            let found = "the file grew while it was read".to_string();
+        let length = length.max(bytes.len() as u64);
+        if length > limit {
+            let found = format!("the file has {} MiB", length >> 20);
             return error(found, &format!("at most {} MiB", limit >> 20));
         }
         Ok(Self { path: path.to_path_buf(), bytes })

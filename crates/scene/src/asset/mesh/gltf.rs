@@ -22,20 +22,13 @@ use std::fmt::{Arguments, Display};
 use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Parts of the names of extensions without which a file is read.
-const OPTIONAL: [&str; 8] = [
-    "_materials_",
-    "_texture_",
-    "_lights_",
-    "_xmp",
-    "_animation_",
-    "_features",
-    "_metadata",
-    "_instancing",
-];
+const OPTIONAL: [&str; 7] =
+    ["_materials_", "_texture_", "_lights_", "_xmp", "_animation_", "_features", "_metadata"];
 
-/// Extensions that are applied, or refused where they occur.
-const KNOWN: [&str; 4] = [
+/// Extensions that are applied, or noted or refused where they occur.
+const KNOWN: [&str; 5] = [
     "KHR_mesh_quantization",
+    "EXT_mesh_gpu_instancing",
     "KHR_draco_mesh_compression",
     "EXT_meshopt_compression",
     "KHR_meshopt_compression",
@@ -743,7 +736,6 @@ mod tests {
             "KHR_lights_punctual",
             "KHR_xmp_json_ld",
             "EXT_structural_metadata",
-            "EXT_mesh_gpu_instancing",
         ] {
             let mut changed = file.clone();
             changed["extensionsRequired"] = json!([name]);
@@ -848,6 +840,7 @@ mod tests {
         let texture = json!({"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0, 0, 1]});
         file["materials"] = json!([{"pbrMetallicRoughness": texture}]);
         file["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": 9}});
+        file["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
         let copy = file["meshes"][0]["primitives"][0].clone();
         file["meshes"][0]["primitives"].as_array_mut().unwrap().push(copy);
         file["meshes"][0]["primitives"].as_array_mut().unwrap().push(json!({"mode": 1}));

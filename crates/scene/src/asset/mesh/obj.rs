@@ -97,8 +97,12 @@ impl Parser<'_> {
         let values = without_comment(rest);
         match keyword {
             b"v" => {
-                let position = self.position(values);
+                let position: Option<[f64; 3]> = numbers(words(values));
                 let position = position.ok_or_else(|| self.wrong("vertex is not three numbers"))?;
+                // A fourth number is a weight, which only free-form surfaces use.
+                if words(values).count() > 4 {
+                    self.builder.note("a colour of a vertex was not read");
+                }
                 if !position.iter().all(|x| x.abs() <= MAX_COORDINATE) {
                     let [x, y, z] = position;
                     let found = format!("a vertex lies at [{x}, {y}, {z}]");
@@ -181,21 +185,6 @@ impl Parser<'_> {
             let uv = uv.map(|i| self.uvs[i].map(|x| x as f32));
             self.builder.vertex(self.positions[position], normal, uv)
         })
-    }
-
-    /// Parses three coordinates. If exactly one more number follows, it is the weight of the vertex,
-    /// by which they are divided. If several follow, they are a colour.
-    fn position(&mut self, values: &[u8]) -> Option<[f64; 3]> {
-        let position: [f64; 3] = numbers(words(values))?;
-        let weight = match words(values).count() {
-            3 => 1.0,
-            4 => numbers(words(values).skip(3)).map(|[weight]| weight)?,
-            _ => {
-                self.builder.note("a colour of a vertex was not read");
-                1.0
-            }
-        };
-        (weight != 0.0).then(|| position.map(|x| x / weight))
     }
 
     /// Reads the MTL files that `names` states: one file whose name may have blanks, or several.
