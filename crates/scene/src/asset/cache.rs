@@ -179,10 +179,11 @@ impl Assets {
         load(&self.radiance_maps, path, read, RadianceMap::bytes)
     }
 
-    /// Checks that the files that are not in the cache fit into memory together, by their headers.
+    /// Checks, by the headers of `files`, that those that are not in the cache fit into memory
+    /// together.
     ///
     /// # Errors
-    /// Fails with an error of the largest file.
+    /// Fails with an error about the largest file if they do not fit.
     pub fn check_total_memory(&self, files: &[(AssetKind, PathBuf)]) -> Result<(), AssetError> {
         let (mut sum, mut decoding, mut largest) = (0u64, 0, (0, Path::new("")));
         let mut counted = HashSet::new();

@@ -164,6 +164,7 @@ fn find<const N: usize>(
     with_prefix("").or_else(|| others.next().filter(|_| others.next().is_none()))
 }
 
+/// Returns the memory \[bytes\] of a row of blocks after decoding.
 fn block_bytes(header: &Header) -> u64 {
     let Vec2(width, height) = header.layer_size;
     let rows = match header.blocks {

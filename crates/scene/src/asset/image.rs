@@ -74,7 +74,9 @@ fn linear_table(last: u16) -> Vec<f32> {
     (0..=last).map(linear).collect()
 }
 
+/// Linear light of the levels of 8 bits.
 static BYTES: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(255));
+/// Linear light of the levels of 16 bits.
 static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(65535));
 
 impl Image {

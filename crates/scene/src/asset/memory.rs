@@ -1,4 +1,4 @@
-//! Memory that assets take, by the headers of their files, before they are decoded.
+//! Estimates of the memory of assets from the headers of their files.
 
 use crate::asset::file::FileContents;
 use crate::asset::{Image, RadianceMap, mesh};
@@ -29,11 +29,13 @@ pub struct ImageMemory {
 /// Least memory of a mesh \[bytes per byte of its file\].
 const MESH_BYTES: u64 = 2;
 
-/// Lengths of the beginning of a file that are tried, until the header is complete.
+/// Lengths \[bytes\] of the beginnings of a file that are read in turn, until one has the whole
+/// header.
 const START_BYTES: [u64; 2] = [1 << 18, 1 << 26];
 
-/// Returns the memory of the asset in the file at `path` of `length` bytes: after decoding, and the
-/// further memory during decoding, with up to two copies of the file; zero if the header cannot be read.
+/// Returns two estimates for the asset in the file at `path` of `length` bytes \[bytes\]: its memory
+/// after decoding, and the further memory during decoding, with up to two copies of the file. Both
+/// are 0 if the header cannot be read.
 pub fn asset_memory(kind: AssetKind, path: &Path, length: u64) -> [u64; 2] {
     let memory = |start: &FileContents| match kind {
         AssetKind::Mesh => {

@@ -62,8 +62,8 @@ impl RadianceMap {
         Self { size, pixels, distribution, mean, notes: Vec::new() }
     }
 
-    /// Decodes an environment image file. Values of PNG and JPEG files are sRGB levels. Negative
-    /// values are replaced by 0, and values that are no radiance as [`repair`] does.
+    /// Decodes an environment image file. Values of PNG and JPEG files are sRGB levels. Values that
+    /// are no radiances are replaced by [`repair`].
     pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
         let check = |size| check_size(source, size, MAX_MAP_SIDE, MAX_MAP_PIXELS);
         let (mut notes, mut matrix) = (Vec::new(), None);

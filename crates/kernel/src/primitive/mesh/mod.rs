@@ -19,7 +19,8 @@ pub struct TriangleMesh {
     pub center: [f64; 3],
     /// Vertex indices, three per triangle, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
-    /// Unit normal per vertex. `None` if the file has no normals.
+    /// Unit normal per vertex; zero at vertices without a triangle. `None` if the file has no
+    /// normals.
     pub normals: Option<Vec<[f32; 3]>>,
     /// `true` if a mesh without normals is flat by the rules of its format.
     pub is_flat: bool,

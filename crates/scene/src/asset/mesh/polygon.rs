@@ -198,61 +198,29 @@ mod tests {
         (0..teeth).flat_map(tooth).chain(base).collect()
     }
 
-    const KEYHOLE: [[f64; 2]; 10] = [
-        [0.0, 0.0],
-        [4.0, 0.0],
-        [4.0, 4.0],
-        [0.0, 4.0],
-        [0.0, 0.0],
-        [1.0, 1.0],
-        [1.0, 3.0],
-        [3.0, 3.0],
-        [3.0, 1.0],
-        [1.0, 1.0],
-    ];
+    /// Returns the points with the coordinates in `text`.
+    fn points(text: &str) -> Vec<[f64; 2]> {
+        let numbers: Vec<f64> = text.split(' ').map(|number| number.parse().unwrap()).collect();
+        numbers.as_chunks().0.to_vec()
+    }
+
+    const KEYHOLE: &str = "0 0 4 0 4 4 0 4 0 0 1 1 1 3 3 3 3 1 1 1";
 
     /// Square with two holes that are reached by cuts from the same corner.
-    const TWO_HOLES: [[f64; 2]; 14] = [
-        [0.0, 0.0],
-        [1.0, 0.5],
-        [0.5, 1.0],
-        [1.0, 1.0],
-        [1.0, 0.5],
-        [0.0, 0.0],
-        [9.0, 0.0],
-        [9.0, 9.0],
-        [7.0, 5.0],
-        [5.0, 5.0],
-        [5.0, 7.0],
-        [7.0, 5.0],
-        [9.0, 9.0],
-        [0.0, 9.0],
-    ];
+    const TWO_HOLES: &str = "0 0 1 .5 .5 1 1 1 1 .5 0 0 9 0 9 9 7 5 5 5 5 7 7 5 9 9 0 9";
 
     #[test]
     fn concave_polygons_keep_their_area_in_every_order_and_plane() {
         let shapes = [
-            ("dart", vec![[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [0.6, 1.0]]),
-            (
-                "u",
-                vec![
-                    [0., 0.],
-                    [3., 0.],
-                    [3., 2.],
-                    [2., 2.],
-                    [2., 1.],
-                    [1., 1.],
-                    [1., 2.],
-                    [0., 2.],
-                ],
-            ),
+            ("dart", points("0 0 2 1 0 2 .6 1")),
+            ("u", points("0 0 3 0 3 2 2 2 2 1 1 1 1 2 0 2")),
             ("star", star(5)),
             ("large star", star(70)),
             ("spiral", spiral(60)),
             ("comb", comb(9)),
-            ("keyhole", KEYHOLE.to_vec()),
-            ("two holes", TWO_HOLES.to_vec()),
-            ("doubled corners", vec![[0., 0.], [0., 0.], [2., 1.], [2., 1.], [0., 2.], [0.6, 1.]]),
+            ("keyhole", points(KEYHOLE)),
+            ("two holes", points(TWO_HOLES)),
+            ("doubled corners", points("0 0 0 0 2 1 2 1 0 2 .6 1")),
         ];
         // Planes: three axes, an oblique one, and one far from the origin.
         let planes = [
@@ -302,7 +270,7 @@ mod tests {
     #[test]
     fn convex_polygons_are_fans_and_faulty_ones_end() {
         let circle: Vec<_> = star(50).into_iter().step_by(2).collect();
-        for convex in [circle, vec![[0., 0.], [1., 0.], [2., 0.], [2., 1.], [0., 1.]]] {
+        for convex in [circle, points("0 0 1 0 2 0 2 1 0 1")] {
             assert!(divide(&flat(&convex)).is_none());
         }
         for flat in [&[][..], &[DVec3::ZERO], &[DVec3::ZERO, DVec3::X, DVec3::X * 2.0]] {
