@@ -1,5 +1,5 @@
 //! glTF 2.0 files, text and binary. All primitives are merged into one mesh, with the transforms of
-//! their nodes, skins and morph weights applied. Positions, normals, texture coordinates and base
+//! their nodes and the morph weights applied. Positions, normals, texture coordinates and base
 //! colour factors are read. Everything else is ignored, even if it is faulty.
 
 mod document;
@@ -8,14 +8,14 @@ use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES};
 use crate::asset::mesh::builder::Builder;
 use crate::asset::mesh::gltf::document::{
-    Attributes, Document, Material, Node, Primitive, Sparse, View, whole,
+    Attributes, Document, Material, Primitive, Sparse, View, whole,
 };
 use crate::asset::mesh::strip;
 use crate::process_memory::missing_memory;
 use crate::value::truncated;
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use glam::{DAffine3, DMat4, DVec3};
+use glam::{DAffine3, DVec3};
 use std::cell::{Cell, OnceCell};
 use std::collections::HashSet;
 use std::fmt::{Arguments, Display};
@@ -66,14 +66,17 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
         if node.extensions.instances.is_some() {
             builder.note("the instances of a node were not read");
         }
+        if node.skin.is_some() {
+            builder.note("the joints of a skin were not read");
+        }
         let mesh = gltf.part(&gltf.document.meshes, "meshes", m)?;
         let weights = if node.weights.is_empty() { &mesh.weights } else { &node.weights };
-        let joints = gltf.joints(node, &scene_from_node)?;
+        // The joints of a skin place its mesh; its node does not.
+        let map = if node.skin.is_some() { DAffine3::IDENTITY } else { *map };
         gltf.count(mesh.primitives.len())?;
         for (i, primitive) in mesh.primitives.iter().enumerate() {
             let place = format_args!("meshes[{m}].primitives[{i}]");
-            let joints = joints.as_deref();
-            Part { gltf: &gltf, primitive, place, weights, joints }.add(&mut builder, *map)?;
+            Part { gltf: &gltf, primitive, place, weights }.add(&mut builder, map)?;
         }
     }
     builder.finish()
@@ -187,27 +190,6 @@ impl<'a> Gltf<'a> {
         Ok(scene_from_node)
     }
 
-    /// Returns the maps of the joints of a node's skin; `None` without a skin.
-    fn joints(
-        &self,
-        node: &Node,
-        scene_from_node: &[Option<DAffine3>],
-    ) -> Result<Option<Vec<DAffine3>>, AssetError> {
-        let Some(skin) = node.skin else { return Ok(None) };
-        let skin = self.part(&self.document.skins, "skins", skin)?;
-        self.count(skin.joints.len())?;
-        let matrices = match skin.inverse_bind_matrices {
-            Some(accessor) => self.numbers::<16>(accessor)?,
-            None => Vec::new(),
-        };
-        let joint = |(i, joint): (usize, &f64)| {
-            let map = self.part(scene_from_node, "nodes", *joint)?.unwrap_or(DAffine3::IDENTITY);
-            let matrix = matrices.get(i).map(DMat4::from_cols_array);
-            Ok(map * matrix.map_or(DAffine3::IDENTITY, DAffine3::from_mat4))
-        };
-        skin.joints.iter().enumerate().map(joint).collect::<Result<_, _>>().map(Some)
-    }
-
     /// Returns the attribute `name`; empty if the file lacks it.
     fn attribute<const N: usize>(
         &self,
@@ -222,13 +204,7 @@ impl<'a> Gltf<'a> {
         let accessor = self.part(&self.document.accessors, "accessors", index)?;
         let error =
             |found, expected| Err(self.error(format_args!("accessors[{index}]"), found, expected));
-        let kind = match N {
-            1 => "SCALAR",
-            2 => "VEC2",
-            3 => "VEC3",
-            4 => "VEC4",
-            _ => "MAT4",
-        };
+        let kind = ["SCALAR", "VEC2", "VEC3"][N - 1];
         if accessor.kind != kind {
             return error(format!("the type is \"{}\"", truncated(&accessor.kind)), kind);
         }
@@ -407,19 +383,17 @@ fn faces(mode: f64, corners: usize, mirrored: bool) -> impl ExactSizeIterator<It
     })
 }
 
-/// Part of a glTF scene: a primitive (a piece of a mesh) with the morph weights of its node and the
-/// maps of the joints of its skin.
+/// Part of a glTF scene: a primitive (a piece of a mesh) with the morph weights of its node.
 struct Part<'a, 'b> {
     gltf: &'a Gltf<'b>,
     primitive: &'a Primitive,
     place: Arguments<'a>,
     weights: &'a [f64],
-    joints: Option<&'a [DAffine3]>,
 }
 
 impl Part<'_, '_> {
-    /// Adds vertices, colour and triangles of this part, placed by `map` or by its joints alone.
-    /// Leaves out points and lines.
+    /// Adds vertices, colour and triangles of this part, placed by `map`. Leaves out points and
+    /// lines.
     fn add(&self, builder: &mut Builder, map: DAffine3) -> Result<(), AssetError> {
         let Primitive { attributes, extensions, mode, indices, .. } = self.primitive;
         if extensions.draco.is_some() {
@@ -438,15 +412,12 @@ impl Part<'_, '_> {
             return Ok(());
         }
         let uvs = self.gltf.attribute::<2>(attributes, "TEXCOORD_0")?;
-        let skin = self.skin(positions.len())?;
         self.add_color(builder)?;
-        let with_normals = |map: DAffine3| (map, map.matrix3.inverse().transpose());
-        let fixed = with_normals(skin.first().copied().unwrap_or(map));
-        let is_mirrored = fixed.0.matrix3.determinant() < 0.0;
+        let normal_map = map.matrix3.inverse().transpose();
+        let is_mirrored = map.matrix3.determinant() < 0.0;
         builder.reserve(positions.len(), 0)?;
         let base = builder.vertices();
         for (i, position) in positions.into_iter().enumerate() {
-            let (map, normal_map) = skin.get(i).map_or(fixed, |map| with_normals(*map));
             let normal = normals.get(i).map(|normal| {
                 let normal = normal_map * DVec3::from(*normal);
                 normal.normalize_or_zero().as_vec3().to_array()
@@ -480,29 +451,6 @@ impl Part<'_, '_> {
             }
         }
         Ok(values)
-    }
-
-    /// Returns the map of each vertex: the mean of the maps of its joints, by their weights. Empty
-    /// without a skin.
-    fn skin(&self, vertices: usize) -> Result<Vec<DAffine3>, AssetError> {
-        let Some(joints) = self.joints else { return Ok(Vec::new()) };
-        let mut sums = vec![DAffine3::ZERO; vertices];
-        let attribute = |name: String| self.gltf.attribute::<4>(&self.primitive.attributes, &name);
-        for set in 0.. {
-            let indices = attribute(format!("JOINTS_{set}"))?;
-            let weights = attribute(format!("WEIGHTS_{set}"))?;
-            if indices.is_empty() || weights.is_empty() {
-                break;
-            }
-            for ((sum, indices), weights) in sums.iter_mut().zip(indices).zip(weights) {
-                for (joint, weight) in indices.into_iter().zip(weights).filter(|(_, w)| *w != 0.0) {
-                    let map = self.gltf.part(joints, "joints", joint)?;
-                    sum.matrix3 += map.matrix3 * weight;
-                    sum.translation += map.translation * weight;
-                }
-            }
-        }
-        Ok(sums)
     }
 
     /// Makes the base colour of this part the colour of the triangles that are added next. Notes
@@ -570,8 +518,7 @@ mod tests {
         }
 
         fn accessor(&mut self, component: u32, items: &[&[f64]]) -> usize {
-            let kind =
-                ["SCALAR", "VEC2", "VEC3", "VEC4"].get(items[0].len() - 1).unwrap_or(&"MAT4");
+            let kind = ["SCALAR", "VEC2", "VEC3"][items[0].len() - 1];
             let view = self.view(component, items);
             self.accessors.push(json!({"bufferView": view, "componentType": component,
                                        "count": items.len(), "type": kind}));
@@ -816,39 +763,23 @@ mod tests {
     }
 
     #[test]
-    fn gltf_skins_and_morphs_are_applied() {
+    fn gltf_morph_weights_are_applied_and_skins_noted() {
         let (mut parts, _) = square();
         let shift = parts.accessor(5126, &SQUARE);
-        let joints = parts.accessor(5121, &[&[0.0, 1.0, 0.0, 0.0] as &[f64]; 4]);
-        let weights = parts.accessor(5126, &[&[0.25, 0.75, 0.0, 0.0] as &[f64]; 4]);
-        let to = |x: f64| DMat4::from_translation(DVec3::new(x, 0.0, 0.0)).to_cols_array();
-        let inverse = parts.accessor(5126, &[&to(-1.0)[..], &to(-2.0)]);
-        let file = parts.file(json!({"POSITION": 0, "JOINTS_0": joints, "WEIGHTS_0": weights}));
-        let bounds = |change: &dyn Fn(&mut Value)| {
-            let mut file = file.clone();
-            file["nodes"][0]["translation"] = json!([0, 7, 0]);
-            change(&mut file);
-            read(&file).bounds
-        };
-        assert_eq!(bounds(&|_| {}), [[0.0, 7.0, 0.0], [1.0, 8.0, 0.0]]);
-        // Joints at x = 5 and x = 9 move the mesh by a quarter of 4 and three quarters of 7.
-        let with_skin = |file: &mut Value| {
-            file["nodes"][0]["skin"] = json!(0);
-            file["skins"] = json!([{"joints": [1, 2], "inverseBindMatrices": inverse}]);
-            let nodes = file["nodes"].as_array_mut().unwrap();
-            nodes.push(json!({"translation": [5, 0, 0], "children": [2]}));
-            nodes.push(json!({"translation": [4, 0, 0]}));
-            file["scenes"][0]["nodes"] = json!([0, 1]);
-        };
-        assert_eq!(bounds(&with_skin), [[6.25, 0.0, 0.0], [7.25, 1.0, 0.0]]);
+        let mut file = parts.file(json!({"POSITION": 0}));
+        file["nodes"][0]["translation"] = json!([0, 7, 0]);
+        assert_eq!(read(&file).bounds, [[0.0, 7.0, 0.0], [1.0, 8.0, 0.0]]);
+        let mut with_skin = file.clone();
+        with_skin["nodes"][0]["skin"] = json!(0);
+        let mesh = read(&with_skin);
+        assert_eq!(mesh.bounds, [[0.0; 3], [1.0, 1.0, 0.0]]);
+        assert_eq!(mesh.notes, ["the joints of a skin were not read"]);
+        file["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": shift}]);
         for (list, weight, size) in
-            [("nodes", 1.0, 2.0), ("meshes", 0.5, 1.5), ("meshes", 0.0, 1.0)]
+            [("meshes", 0.0, 1.0), ("meshes", 0.5, 1.5), ("nodes", 1.0, 2.0)]
         {
-            let morphed = |file: &mut Value| {
-                file["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": shift}]);
-                file[list][0]["weights"] = json!([weight]);
-            };
-            assert_eq!(bounds(&morphed), [[0.0, 7.0, 0.0], [size, 7.0 + size, 0.0]], "{list}");
+            file[list][0]["weights"] = json!([weight]);
+            assert_eq!(read(&file).bounds, [[0.0, 7.0, 0.0], [size, 7.0 + size, 0.0]], "{list}");
         }
     }
 

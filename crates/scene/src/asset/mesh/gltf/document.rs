@@ -28,13 +28,13 @@ objects! {
     /// Description of a glTF file.
     Document {
         asset: Asset, scene: Option<f64>, scenes: Vec<Scene>, nodes: Vec<Node>,
-        meshes: Vec<Mesh>, skins: Vec<Skin>, materials: Vec<Material>, accessors: Vec<Accessor>,
+        meshes: Vec<Mesh>, materials: Vec<Material>, accessors: Vec<Accessor>,
         buffer_views: Vec<BufferView>, buffers: Vec<Buffer>, extensions_required: Vec<String>
     }
     Asset { version: String }
     Scene { nodes: Vec<f64> }
     Node {
-        children: Vec<f64>, mesh: Option<f64>, skin: Option<f64>, weights: Vec<f64>,
+        children: Vec<f64>, mesh: Option<f64>, skin: Option<IgnoredAny>, weights: Vec<f64>,
         matrix: Option<Box<[f64; 16]>>, translation: Option<[f64; 3]>,
         rotation: Option<[f64; 4]>, scale: Option<[f64; 3]>, extensions: Extensions
     }
@@ -43,7 +43,6 @@ objects! {
         attributes: Attributes, indices: Option<f64>, material: Option<f64>, mode: Option<f64>,
         targets: Vec<Attributes>, extensions: Extensions
     }
-    Skin { inverse_bind_matrices: Option<f64>, joints: Vec<f64> }
     Material { pbr_metallic_roughness: Surface }
     /// Metallic-roughness surface of a material.
     Surface { base_color_factor: Option<[f32; 4]>, base_color_texture: Option<IgnoredAny> }
