@@ -1,4 +1,5 @@
-//! OpenEXR files of environments: choice of the channels, display window, conversion of primaries.
+//! OpenEXR files of environments. The channels are chosen, the display window is cut out; the primaries
+//! are left to the caller.
 
 use crate::asset::error::AssetError;
 use crate::asset::file::FileContents;
@@ -15,7 +16,8 @@ use glam::DMat3;
 use std::collections::HashMap;
 use std::io::Cursor;
 
-const EXPECTED: &str = "one layer that is not deep, with the channels R, G and B, or Y alone, as `exrheader` shows them";
+const EXPECTED: &str = "one layer that is not deep, with the channels R, G and B, or Y alone, as \
+                        `exrheader` shows them";
 
 /// OpenEXR file whose headers have been read.
 pub struct ExrFile {
@@ -30,7 +32,7 @@ pub struct ExrFile {
     pub srgb_from_primaries: Option<DMat3>,
 }
 
-/// Names of the channels of an image.
+/// Names of the channels of an image: red, green and blue, or grey.
 #[derive(Clone, Debug, PartialEq)]
 enum Channels {
     Colors([Text; 3]),
@@ -140,9 +142,9 @@ fn choose(headers: &[Header]) -> Option<(usize, Channels)> {
     layers().find_map(colors).or_else(|| layers().find_map(grey))
 }
 
-/// Returns the channels with the given letters, without those in `excluded` beside them. Their names
-/// have no prefix such as `ViewLayer.Combined.`, or it is the only one in the layer. Case has no
-/// influence.
+/// Returns the channels with the given letters. Their names have no prefix, or one such as
+/// `ViewLayer.Combined.` that is the only one in the layer. With this prefix there is no channel
+/// with a letter in `excluded`. Case has no influence.
 fn find<const N: usize>(
     header: &Header,
     letters: [&str; N],
@@ -178,12 +180,14 @@ fn block_bytes(header: &Header) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use exr::compression::Compression;
+    use exr::compression::Compression::{
+        B44, B44A, DWAA, DWAB, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16,
+    };
     use exr::image::{
         AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image as Picture, Layer, Levels,
     };
     use exr::math::RoundingMode;
-    use exr::meta::attribute::LineOrder;
+    use exr::meta::attribute::{IntegerBounds, LineOrder};
     use exr::meta::header::{ImageAttributes, LayerAttributes};
     use exr::prelude::f16;
     use std::path::PathBuf;
@@ -208,7 +212,7 @@ mod tests {
 
     fn bytes_of(layers: Vec<Layer<AnyChannels<FlatSamples>>>) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
-        let window = exr::meta::attribute::IntegerBounds::from_dimensions(SIZE);
+        let window = IntegerBounds::from_dimensions(SIZE);
         let picture = Picture::from_layers(ImageAttributes::new(window), layers);
         picture.write().to_buffered(&mut bytes).unwrap();
         bytes.into_inner()
@@ -225,18 +229,9 @@ mod tests {
     #[test]
     fn all_encodings_are_decoded() {
         let tiles = Blocks::Tiles(Vec2(16, 9));
-        let lossless = [
-            Compression::Uncompressed,
-            Compression::RLE,
-            Compression::ZIP1,
-            Compression::ZIP16,
-            Compression::PIZ,
-            Compression::PXR24,
-        ];
-        let lossy =
-            [Compression::B44, Compression::B44A, Compression::DWAA(None), Compression::DWAB(None)];
-        let methods = lossless.map(|method| (method, 0.0)).into_iter();
-        for (compression, tolerance) in methods.chain(lossy.map(|method| (method, 2.0))) {
+        let lossless = [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24].map(|method| (method, 0.0));
+        let lossy = [B44, B44A, DWAA(None), DWAB(None)].map(|method| (method, 2.0));
+        for (compression, tolerance) in lossless.into_iter().chain(lossy) {
             for blocks in [Blocks::ScanLines, tiles] {
                 for line_order in [LineOrder::Increasing, LineOrder::Decreasing] {
                     for half in [true, false] {
@@ -251,10 +246,11 @@ mod tests {
                         }
                         let case = format!("{compression:?} {blocks:?} {line_order:?} {half}");
                         let pixels = read_pixels(bytes_of(vec![layer])).expect(&case);
-                        for (i, x) in (0..3).flat_map(|c| values(c).enumerate()).enumerate() {
-                            let (c, (pixel, expected)) = (i / (SIZE.0 * SIZE.1), x);
-                            let found = pixels[pixel][c];
-                            assert!((found - expected).abs() <= tolerance, "{case}: {found}");
+                        for c in 0..3 {
+                            for (pixel, expected) in pixels.iter().zip(values(c)) {
+                                let difference = (pixel[c] - expected).abs();
+                                assert!(difference <= tolerance, "{case}: {difference}");
+                            }
                         }
                     }
                 }
@@ -292,7 +288,6 @@ mod tests {
 
     #[test]
     fn channels_are_chosen_by_their_names() {
-        let first: Vec<f32> = values(0).collect();
         for (layers, expected) in [
             (&[&["R", "G", "B"][..]][..], Ok([0, 1, 2])),
             (&[&["r", "g", "b"]], Ok([0, 1, 2])),
@@ -316,7 +311,7 @@ mod tests {
             match (pixels, expected) {
                 (Ok(pixels), Ok(numbers)) => {
                     assert_eq!(pixels[1], numbers.map(|n| values(n).nth(1).unwrap()), "{layers:?}");
-                    assert_eq!(pixels.len(), first.len());
+                    assert_eq!(pixels.len(), SIZE.0 * SIZE.1);
                 }
                 (Err(error), Err(words)) => assert!(error.found.contains(words), "{error}"),
                 (found, _) => panic!("{layers:?}: {:?}", found.map(|pixels| pixels[0])),
@@ -324,15 +319,16 @@ mod tests {
         }
     }
 
+    /// Returns a picture of one layer. `change` changes its attributes.
     fn picture_with(
         size: (usize, usize),
-        pixels: &[[f32; 3]],
+        color: [f32; 3],
         change: impl Fn(&mut ImageAttributes, &mut LayerAttributes),
     ) -> Vec<u8> {
-        let samples = |c: usize| FlatSamples::F32(pixels.iter().map(|pixel| pixel[c]).collect());
-        let channels = ["R", "G", "B"].into_iter().enumerate();
-        let channels = channels.map(|(i, name)| AnyChannel::new(name, samples(i))).collect();
-        let window = exr::meta::attribute::IntegerBounds::from_dimensions(size);
+        let samples = |x| FlatSamples::F32(vec![x; size.0 * size.1]);
+        let channels = ["R", "G", "B"].into_iter().zip(color);
+        let channels = channels.map(|(name, x)| AnyChannel::new(name, samples(x))).collect();
+        let window = IntegerBounds::from_dimensions(size);
         let (mut image, mut own) = (ImageAttributes::new(window), LayerAttributes::default());
         change(&mut image, &mut own);
         let layer = Layer::new(size, own, Encoding::UNCOMPRESSED, AnyChannels::sort(channels));
@@ -350,7 +346,7 @@ mod tests {
             white: Vec2(0.3127, 0.329),
         };
         let read = |red, green| {
-            let bytes = picture_with((1, 1), &[[8.0, 2.0, 1.0]], |image, _| {
+            let bytes = picture_with((1, 1), [8.0, 2.0, 1.0], |image, _| {
                 image.chromaticities = Some(chromaticities(red, green));
             });
             let map = crate::asset::RadianceMap::parse(&source(bytes))?;
@@ -366,13 +362,13 @@ mod tests {
 
     #[test]
     fn cube_maps_are_refused() {
-        let cube = picture_with((4, 24), &[[1.0; 3]; 96], |_, own| {
+        let cube = picture_with((4, 24), [1.0; 3], |_, own| {
             own.environment_map = Some(EnvironmentMap::Cube);
         });
         let error = read_pixels(cube).unwrap_err().to_string();
         let words = "it is a cube map. Expected an equirectangular image, as `exrenvmap -latlong`";
         assert!(error.contains(words), "{error}");
-        let flat = picture_with((4, 2), &[[1.0; 3]; 8], |_, own| {
+        let flat = picture_with((4, 2), [1.0; 3], |_, own| {
             own.environment_map = Some(EnvironmentMap::LatitudeLongitude);
         });
         assert_eq!(read_pixels(flat), Ok(vec![[1.0; 3]; 8]));

@@ -275,25 +275,11 @@ fn jpeg_header(source: &FileContents) -> Result<JpegHeader<'_>, AssetError> {
     Ok(JpegHeader { decoder, size, color })
 }
 
-/// Returns the position of the first scan of a JPEG file. Thumbnails in segments before it are skipped.
-fn first_scan(bytes: &[u8]) -> Option<usize> {
-    let mut at = 2;
-    loop {
-        at += match *bytes.get(at..)?.first_chunk::<4>()? {
-            [0xff, 0xda, _, _] => return Some(at),
-            [0xff, 0..=0xfe, high, low] => 2 + usize::from(u16::from_be_bytes([high, low])),
-            [_, _, _, _] => 1,
-        };
-    }
-}
-
 /// Decodes a JPEG file.
 fn decode_jpeg(source: &FileContents) -> Result<Image, AssetError> {
     // The decoder takes bytes that are missing for zeros, which are data. No Huffman code consists of
     // ones alone (ITU T.81, annex C): ones before the end make missing data an error.
-    let scan = first_scan(&source.bytes).unwrap_or(source.bytes.len());
-    let end = source.bytes[scan..].windows(2).position(|pair| pair == [0xff, 0xd9]);
-    let end = end.map(|end| scan + end);
+    let end = source.bytes.windows(2).rposition(|pair| pair == [0xff, 0xd9]);
     let (data, rest) = source.bytes.split_at(end.unwrap_or(source.bytes.len()));
     let bytes = [data, &[0xff, 0].repeat(16), rest].concat();
     let padded = FileContents { path: source.path.clone(), bytes };
@@ -397,17 +383,12 @@ mod tests {
         ] {
             for is_transparent in [false, true] {
                 let mut info = info([2, 1], color, depth);
-                let entries = match color {
-                    Grayscale => 2,
-                    Rgb => 6,
-                    Indexed => 2,
-                    GrayscaleAlpha | Rgba => 0,
-                };
+                let has_alpha = [GrayscaleAlpha, Rgba].contains(&color);
                 if color == Indexed {
                     info.palette = Some(vec![9, 8, 7, 255, 0, 1].into());
                 }
-                if is_transparent && entries > 0 {
-                    info.trns = Some(vec![0; entries].into());
+                if is_transparent && !has_alpha {
+                    info.trns = Some(vec![0; if color == Rgb { 6 } else { 2 }].into());
                 }
                 let source = png(info, data);
                 let image = Image::parse(&source).unwrap();

@@ -167,8 +167,8 @@ impl<'a> Gltf<'a> {
         let roots = match scene.or(scenes.first().map(|_| 0.0)) {
             Some(scene) => self.part(scenes, "scenes", scene)?.nodes.clone(),
             None => {
-                let children = nodes.iter().flat_map(|n| &n.children).map(|i| whole(*i));
-                let children: HashSet<usize> = children.collect();
+                let children = nodes.iter().flat_map(|node| &node.children);
+                let children: HashSet<_> = children.map(|child| whole(*child)).collect();
                 (0..nodes.len()).filter(|i| !children.contains(i)).map(|i| i as f64).collect()
             }
         };
@@ -210,26 +210,25 @@ impl<'a> Gltf<'a> {
         }
         let (count, component_type) = (whole(accessor.count), accessor.component_type);
         self.count(count)?;
+        let bytes = self.source.bytes.len() as u64 + self.bytes_read.get();
         let mut all: Vec<[f64; N]> = match accessor.buffer_view {
             Some(buffer_view) => {
                 let byte_offset = accessor.byte_offset;
                 self.items(&View { buffer_view, byte_offset, component_type }, count)?
             }
             // All elements are 0. There are as many as in other accessors, which have data.
-            None if count.saturating_mul(N) as u64 <= self.total_bytes() => vec![[0.0; N]; count],
+            None if count.saturating_mul(N) as u64 <= bytes => vec![[0.0; N]; count],
             None => return error(format!("there are {count} items without data"), "a bufferView"),
         };
         if let Some(Sparse { count, indices, values }) = &accessor.sparse {
+            self.count(whole(*count))?;
             let indices = self.items::<1>(indices, whole(*count))?;
             let values = self.items(&View { component_type, ..*values }, whole(*count))?;
             for ([index], value) in indices.into_iter().zip(values) {
-                match all.get_mut(whole(index)) {
-                    Some(element) => *element = value,
-                    None => {
-                        let found = format!("a sparse index is {index}");
-                        return error(found, "an index of the accessor");
-                    }
-                }
+                let Some(element) = all.get_mut(whole(index)) else {
+                    return error(format!("a sparse index is {index}"), "an index of the accessor");
+                };
+                *element = value;
             }
         }
         if accessor.normalized
@@ -309,10 +308,6 @@ impl<'a> Gltf<'a> {
         };
         self.bytes_read.set(self.bytes_read.get() + bytes.len() as u64);
         Ok(cell.get_or_init(|| bytes))
-    }
-
-    fn total_bytes(&self) -> u64 {
-        self.source.bytes.len() as u64 + self.bytes_read.get()
     }
 }
 
