@@ -108,8 +108,9 @@ and every key with a default may be left out. Unknown keys are errors.
   name has no `..`, is not absolute, and is no URL. A library of colours elsewhere is left out with a
   warning; a buffer of vertices elsewhere is an error.
 - What the reader of a mesh file leaves out or replaces is a warning: points and lines, textures, colours
-  of vertices, extensions of glTF that change neither shape nor colour, triangles without area, normals and
-  texture coordinates that are no numbers. Of a polygon any shape in a plane is filled, also with cuts to holes.
+  of vertices, skins and instances, extensions of glTF that change neither shape nor colour, triangles without
+  area, normals and texture coordinates that are no numbers. Of a polygon any shape in a plane is filled, also
+  with cuts to holes.
 - An environment light is infinitely far away in all directions. It adds to the background, lights diffuse
   surfaces, makes highlights, and is seen by the camera and in mirrors unless `visible = false`. Its image
   is equirectangular: the top row is up (+y), the middle is towards -z, a quarter to the right of the middle
@@ -117,8 +118,8 @@ and every key with a default may be left out. Unknown keys are errors.
   values and NaN are replaced by 0, infinite ones by the largest finite value of the image, at least 65504; a note
   counts NaN and infinite pixels. An image has at most 33554432 pixels.
 - A Radiance image may have any of the eight orders of pixels; `EXPOSURE` and `COLORCORR` are divided out. Of an
-  OpenEXR file, the first layer with the channels R, G and B is shown, otherwise the only channels with such names
-  after a prefix (or those named `Combined`), otherwise Y as grey. Primaries other than those of sRGB are converted.
+  OpenEXR file, the first layer with the channels R, G and B is shown, otherwise Y as grey; their names may have a
+  prefix if it is the only one with such channels in the layer. Primaries other than those of sRGB are converted.
 - A spot light has its full intensity inside the cone of `inner_angle` about its axis and none outside the
   cone of `outer_angle`. Between them the factor is t^2 (3 - 2t), where t rises linearly with the cosine of
   the angle from 0 at the outer to 1 at the inner cone. Equal angles make a sharp edge.
