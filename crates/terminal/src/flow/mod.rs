@@ -34,6 +34,11 @@ const FRAME_SPAN: Duration = Duration::from_millis(100);
 const BUDGET: [f64; 2] = [2e3, 200e3];
 /// Assumed rate in bytes per second before the first measurement.
 const INITIAL_RATE: f64 = 80e3;
+/// Assumed rate in bytes per second before the first measurement of the send queue. It grows until
+/// the queue is full.
+const INITIAL_QUEUE_RATE: f64 = 16e3;
+/// Rate from which the rate of the send queue does not grow: that of the largest frames.
+const MAX_GROWN_RATE: f64 = 6e6;
 /// Smallest assumed rate in bytes per second, at which the smallest frame takes one second. Without
 /// it, the next frame after a pause of the connection would not be due for minutes.
 const MIN_RATE: f64 = 2e3;
@@ -54,6 +59,8 @@ const ROUND_TRIP_INTERVAL: Duration = Duration::from_secs(30);
 const NEW_WEIGHT: f64 = 0.3;
 /// Time after input during which the user counts as active.
 const ACTIVE_TIME: Duration = Duration::from_millis(500);
+/// Time after the user was active from which a relay may be filled to measure its rate.
+const IDLE_AFTER: Duration = Duration::from_secs(2);
 /// Interval at which the send queue is measured.
 const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
 /// Interval at which the send queue is measured once no byte has left it for [`LOST_AFTER`].
@@ -140,10 +147,14 @@ pub struct FlowControl {
 
 impl FlowControl {
     pub fn new(start: InitialLink) -> Self {
-        let is_fixed = start.mode == PacingMode::FixedRate;
+        let rate = match start.mode {
+            PacingMode::Unlimited | PacingMode::AckClocked(_) => INITIAL_RATE,
+            PacingMode::SendQueue => INITIAL_QUEUE_RATE,
+            PacingMode::FixedRate => start.fixed_rate,
+        };
         Self {
             pacing: Pacing::start(start.mode),
-            rate: if is_fixed { start.fixed_rate } else { INITIAL_RATE },
+            rate,
             round_trip: start.round_trip,
             start,
             ..Self::default()
@@ -152,7 +163,7 @@ impl FlowControl {
 
     /// Returns the bytes per second, measured or fixed; `None` for a local terminal.
     pub fn rate(&self) -> Option<f64> {
-        (!matches!(self.pacing, Pacing::Unlimited)).then_some(self.rate)
+        (!matches!(self.pacing, Pacing::Unlimited)).then(|| self.proven_rate())
     }
 
     /// Returns the OKLab distance above which a difference is visible, larger for slower
@@ -245,7 +256,9 @@ impl FlowControl {
             }
             // By this time the oldest frame is acknowledged or lost.
             Pacing::AckClocked(clock) => clock.lost_at().unwrap_or(frame),
-            Pacing::SendQueue(_) => frame.max(self.measures_at(now).unwrap_or(now)),
+            Pacing::SendQueue(_) => {
+                frame.max(self.measures_at(now).unwrap_or(now)).max(self.free_at)
+            }
             Pacing::FixedRate => frame.max(self.free_at),
         };
         let at = if text { room.min(after(TEXT_INTERVAL)) } else { room };
@@ -259,11 +272,20 @@ impl FlowControl {
         if flushed > 0 {
             self.refine_at = now + seconds(flushed, REFINEMENT_SHARE * self.rate);
         }
-        let (duration, limit) = (seconds(bytes, self.rate), self.max_queue());
+        let (duration, is_large) = (seconds(bytes, self.rate), 2 * bytes >= self.budget());
+        let is_idle = now >= self.active_until + IDLE_AFTER;
+        let round_trip = self.round_trip.unwrap_or(DEFAULT_ROUND_TRIP).max(FRAME_SPAN);
         match &mut self.pacing {
             Pacing::Unlimited => {}
             Pacing::AckClocked(clock) => clock.sent(now, bytes, picture, duration),
-            Pacing::SendQueue(queue) => queue.sent(now, bytes, limit),
+            Pacing::SendQueue(queue) => {
+                if !queue.sent(now, bytes, self.free_at) {
+                    self.rate = self.rate.min(queue.settled_rate);
+                } else if is_large && self.rate < MAX_GROWN_RATE {
+                    self.rate *= queue.growth(now, self.rate, round_trip, is_idle);
+                }
+                self.free_at = queue.free_at(self.rate);
+            }
             Pacing::FixedRate => self.free_at = self.free_at.max(now) + duration,
         }
     }
@@ -299,15 +321,10 @@ impl FlowControl {
         let known = self.round_trip.filter(|least| *least <= elapsed);
         self.round_trip = self.round_trip.map(|least| least.min(elapsed));
         if let Some(rate) = clock.measure(frame, at, known, self.rate, budget) {
-            self.average_rate(rate);
+            let average = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
+            self.rate = average.max(MIN_RATE);
         }
         true
-    }
-
-    /// Includes a newly measured rate in the moving average.
-    fn average_rate(&mut self, rate: f64) {
-        let average = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
-        self.rate = average.max(MIN_RATE);
     }
 
     /// Records the number of bytes in the send queue; `None` if the kernel no longer reports it.
@@ -324,10 +341,9 @@ impl FlowControl {
             }
             self.round_trip = self.round_trip.map(|least| least.min(alone.round_trip));
         }
-        if let Some(rate) = sample.rate
-            && (sample.is_full || rate > self.rate)
-        {
-            self.average_rate(rate);
+        if sample.is_filled {
+            self.rate = queue.settle(now, self.rate, sample);
+            self.free_at = queue.free_at(self.rate);
         }
     }
 
@@ -392,10 +408,13 @@ impl FlowControl {
             }
             Pacing::SendQueue(queue) if self.needs_round_trip(now) => queue.bytes == 0.0,
             Pacing::SendQueue(queue) => {
+                // The first effect also does not wait for bytes that a relay may hold.
                 let extra = if is_first(self.last_frame) { self.budget() as f64 } else { 0.0 };
                 // With a shorter queue, the effect of user input waits for fewer bytes.
                 let spare = if is_active { self.budget() as f64 / 2.0 } else { 0.0 };
-                queue.bytes < self.max_queue() + extra - spare
+                let lead = if answers { FRAME_SPAN } else { Duration::ZERO };
+                let is_free = extra > 0.0 || self.free_at <= now + lead;
+                is_free && queue.bytes < self.max_queue() + extra - spare
             }
             Pacing::FixedRate => {
                 let lead = if answers { FRAME_SPAN } else { Duration::ZERO };
@@ -408,7 +427,15 @@ impl FlowControl {
     /// connection transmits in one round trip plus [`FRAME_SPAN`].
     fn max_queue(&self) -> f64 {
         let time = self.round_trip.unwrap_or(DEFAULT_ROUND_TRIP) + FRAME_SPAN;
-        (self.rate * time.as_secs_f64()).max(BUDGET[0])
+        (self.proven_rate() * time.as_secs_f64()).max(BUDGET[0])
+    }
+
+    /// Returns the rate without the growth of the send queue's rate since its last measurement.
+    fn proven_rate(&self) -> f64 {
+        match &self.pacing {
+            Pacing::SendQueue(queue) => self.rate.min(queue.settled_rate),
+            Pacing::Unlimited | Pacing::AckClocked(_) | Pacing::FixedRate => self.rate,
+        }
     }
 
     /// Returns the number of frames in flight that keeps the connection busy.

@@ -1,6 +1,14 @@
 //! Estimates of round trip and rate of an SSH connection from the length of the kernel's TCP send
 //! queue.
+//!
+//! A relay such as a jump host acknowledges bytes before it transmits them, so that the queue stays
+//! empty until the buffer of the relay is full. The rate therefore grows step by step until the
+//! queue becomes full. Between two times at which it becomes full, bytes leave it at the rate of the
+//! connection. The bytes that the relay then holds follow from this rate and the frames sent; no
+//! frame is sent until they have been transmitted.
 
+use crate::flow::{BUDGET, DEFAULT_ROUND_TRIP, FRAME_SPAN, MIN_RATE};
+use std::collections::VecDeque;
 use std::time::Duration;
 
 /// Time after a frame was sent in which its bytes may not have reached the queue yet, because
@@ -10,7 +18,31 @@ const SETTLING: Duration = Duration::from_millis(10);
 /// unknown.
 const BELIEVED_AFTER: Duration = Duration::from_millis(50);
 /// Shortest time over which the rate is measured.
-const SAMPLE: Duration = Duration::from_millis(100);
+const SHORTEST_SAMPLE: Duration = Duration::from_millis(100);
+/// Longest time over which the rate is measured. After a longer time, the connection may have been
+/// idle in between, because frames are sent at less than its rate.
+const LONGEST_SAMPLE: Duration = Duration::from_secs(3);
+/// Time over which a measured rate replaces the earlier estimate.
+const CONVINCING_SAMPLE: Duration = Duration::from_millis(500);
+/// Factors by which the rate grows in a round trip: before and after its first measurement.
+const GROWTH: [f64; 2] = [1.12, 1.03];
+/// Shortest and longest pause of the growth after the queue became full.
+const GROWTH_PAUSE: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(15)];
+/// Ratio of the pause of the growth, which fills a relay, to the time in which the relay becomes
+/// empty.
+const PAUSE_RATIO: f64 = 60.0;
+/// Time after the first measurement of the rate in which the capacity of a relay is measured.
+const LEARNING_TIME: Duration = Duration::from_secs(6);
+/// Share of the rate at which frames are sent, so that a relay becomes empty.
+const PACE: f64 = 0.9;
+/// Largest delay of a frame after the time at which it could have been sent, for a connection that
+/// counts as busy in between.
+const LATENESS: Duration = Duration::from_millis(40);
+/// Upper bound of the ratio of the bytes in the queue to those of frames. Encryption and a
+/// multiplexer add bytes.
+const OVERHEAD: f64 = 1.2;
+/// Time for which sent frames are remembered.
+const MEMORY: Duration = Duration::from_secs(10);
 
 /// Estimate of the queue's length and of the rate at which bytes leave it.
 #[derive(Debug, Default)]
@@ -20,49 +52,34 @@ pub struct SendQueueEstimate {
     pub measured_at: Option<Duration>,
     /// Bytes sent in total.
     sent: f64,
-    /// Time at which the last frame was sent.
-    sent_at: Duration,
+    /// Recently sent frames: times and numbers of bytes.
+    frames: VecDeque<(Duration, f64)>,
     busy: Option<Busy>,
-    /// Beginning of a measurement that was too short for a rate. The next busy period may continue
-    /// it.
-    short_sample: Option<SampleStart>,
+    is_full: bool,
+    /// Time at which the queue was last full.
+    full_at: Duration,
+    /// Time at which the queue became full, and number of bytes that had left it in total. `None`
+    /// if it was not, or if the connection may have been idle since.
+    filled: Option<(Duration, f64)>,
+    /// Last measured rate, or the rate when the queue first became full; infinite before that.
+    pub settled_rate: f64,
+    /// Estimated largest number of bytes that a relay holds. It increases until `learns_until`.
+    capacity: f64,
+    learns_until: Duration,
+    /// Earliest time at which the rate may grow.
+    grows_at: Duration,
     /// Half of the rate when the round trip was last measured. If the rate falls below it, the
     /// round trip is measured again. It may have become longer, and the limit of the queue follows
     /// from it.
     pub doubtful_rate: f64,
 }
 
-/// Beginning of a measurement of the rate.
-#[derive(Clone, Copy, Debug)]
-struct SampleStart {
-    at: Duration,
-    /// Bytes that had left the queue in total.
-    drained: f64,
-}
-
-impl SampleStart {
-    /// Returns the mean rate until `now`, when `drained` bytes have left the queue in total. `None`
-    /// for a time shorter than [`SAMPLE`].
-    fn rate(self, now: Duration, drained: f64) -> Option<f64> {
-        let span = now.saturating_sub(self.at);
-        (span >= SAMPLE).then(|| (drained - self.drained) / span.as_secs_f64())
-    }
-}
-
 /// Busy period, in which the queue is not empty.
 #[derive(Debug)]
 struct Busy {
     since: Duration,
-    /// Beginning of the measurement over the whole period. The measurement continues that of the
-    /// previous period if that was too short and began less than [`SAMPLE`] before this period.
-    whole: SampleStart,
     /// Bytes of the only frame of the period; `None` for several.
     alone: Option<usize>,
-    /// Beginning of the current measurement.
-    sample: Option<SampleStart>,
-    /// `true` if the queue has held as many bytes as flow control permits since the current
-    /// measurement began. Bytes then left the queue at the rate of the connection.
-    is_full: bool,
     /// Time at which bytes last left the queue.
     progress: Duration,
     /// Largest measured number of bytes that had left the queue in total.
@@ -74,10 +91,10 @@ struct Busy {
 pub struct QueueSample {
     /// Only frame of a busy period that has ended. `None` for several frames.
     pub alone: Option<LoneFrame>,
-    /// Bytes per second that left the queue; `None` if the measurement shows no rate.
-    pub rate: Option<f64>,
-    /// `true` if `rate` is the rate of the connection. If `false`, the connection may be faster.
-    pub is_full: bool,
+    /// `true` if the queue has become full.
+    pub is_filled: bool,
+    /// Bytes per second that left the queue, and the time of the measurement.
+    pub rate: Option<(f64, Duration)>,
 }
 
 /// Frame that was sent when the queue was empty, and whose bytes have left it.
@@ -90,37 +107,95 @@ pub struct LoneFrame {
 
 impl SendQueueEstimate {
     pub fn new(doubtful_rate: f64) -> Self {
-        Self { doubtful_rate, ..Self::default() }
+        Self { doubtful_rate, settled_rate: f64::INFINITY, ..Self::default() }
     }
 
-    /// Records that a frame was sent. `limit` is the number of bytes of a full queue.
-    pub fn sent(&mut self, now: Duration, bytes: usize, limit: f64) {
+    /// Records that a frame was sent. `free_at` is the time at which it could be sent earliest.
+    /// Returns `true` if the frame has kept the connection busy.
+    pub fn sent(&mut self, now: Duration, bytes: usize, free_at: Duration) -> bool {
         let alone = self.busy.is_none().then_some(bytes);
-        let busy = self.busy.get_or_insert_with(|| {
-            let continued = self.short_sample.take();
-            let continued = continued.filter(|start| now < start.at + SAMPLE);
-            Busy {
-                since: now,
-                whole: continued.unwrap_or(SampleStart { at: now, drained: self.sent }),
-                alone,
-                sample: None,
-                is_full: false,
-                progress: now,
-                most_drained: self.sent,
-            }
-        });
+        let most_drained = self.sent;
+        let busy = self.busy.get_or_insert(Busy { since: now, alone, progress: now, most_drained });
+        busy.alone = alone;
         self.sent += bytes as f64;
         self.bytes += bytes as f64;
-        self.sent_at = now;
-        busy.alone = alone;
-        busy.is_full |= self.bytes >= limit;
+        self.frames.retain(|(at, _)| *at + MEMORY > now);
+        self.frames.push_back((now, bytes as f64));
+        let is_kept_busy = now <= free_at.max(self.full_at) + LATENESS;
+        if !is_kept_busy {
+            self.filled = None;
+        }
+        is_kept_busy
+    }
+
+    /// Returns the factor by which `rate` grows now. It grows at most once in each `interval`, and
+    /// fills a relay only if the user `is_idle`.
+    pub fn growth(&mut self, now: Duration, rate: f64, interval: Duration, is_idle: bool) -> f64 {
+        let has_relay = self.capacity > rate * SHORTEST_SAMPLE.as_secs_f64();
+        if now < self.grows_at || has_relay && !is_idle {
+            return 1.0;
+        }
+        self.grows_at = now + interval;
+        GROWTH[usize::from(self.settled_rate.is_finite())]
+    }
+
+    /// Returns the time at which the next frame may be sent if the rate is `rate`.
+    pub fn free_at(&self, rate: f64) -> Duration {
+        self.transmitted_at(PACE * rate)
+    }
+
+    /// Returns the time at which a connection of `rate` bytes per second has transmitted all frames.
+    fn transmitted_at(&self, rate: f64) -> Duration {
+        self.frames.iter().fold(Duration::ZERO, |free_at, (at, bytes)| {
+            free_at.max(*at) + Duration::from_secs_f64(bytes / rate)
+        })
+    }
+
+    /// Returns the bytes that a relay holds if the rate is `rate`: those that are neither
+    /// transmitted nor in the queue.
+    fn relayed(&self, now: Duration, rate: f64) -> f64 {
+        let time = self.transmitted_at(rate).saturating_sub(now);
+        (time.as_secs_f64() * rate - self.bytes).max(0.0)
+    }
+
+    /// Returns the new rate after `sample`, in which the queue became full. `rate` is the rate until
+    /// now.
+    pub fn settle(&mut self, now: Duration, rate: f64, sample: QueueSample) -> f64 {
+        let Some((measured, span)) = sample.rate else {
+            self.settled_rate = self.settled_rate.min(rate);
+            return rate;
+        };
+        let is_first = self.learns_until == Duration::ZERO;
+        if is_first {
+            self.learns_until = now + LEARNING_TIME;
+        }
+        let share = span.as_secs_f64() / CONVINCING_SAMPLE.as_secs_f64();
+        let weight = if is_first { 1.0 } else { share.min(1.0) };
+        // The rate is kept if no more than its share `PACE` was sent.
+        let is_kept = (PACE * rate..=rate).contains(&measured);
+        let average = ((1.0 - weight) * rate + weight * measured).max(MIN_RATE);
+        let settled = if is_kept { rate } else { average };
+        self.settled_rate = settled;
+        self.doubtful_rate = self.doubtful_rate.max(settled / 2.0);
+        if now < self.learns_until {
+            let relayed = self.relayed(now, settled).min(settled * MEMORY.as_secs_f64());
+            self.capacity = self.capacity.max(relayed);
+        }
+        // Earlier frames were transmitted at another rate.
+        while self.relayed(now, settled) > self.capacity {
+            self.frames.pop_front();
+        }
+        let pause = PAUSE_RATIO * self.relayed(now, settled) / settled;
+        self.grows_at =
+            now + (GROWTH_PAUSE[0] + Duration::from_secs_f64(pause)).min(GROWTH_PAUSE[1]);
+        settled
     }
 
     /// Returns the time of the next measurement: `interval` after the last one, but at least
     /// [`SETTLING`] after the last frame. Returns `None` if the queue is empty.
     pub fn next_at(&self, interval: Duration) -> Option<Duration> {
         self.busy.as_ref()?;
-        let settled = self.sent_at + SETTLING;
+        let settled = self.frames.back().map_or(SETTLING, |(at, _)| *at + SETTLING);
         Some(self.measured_at.map_or(settled, |at| settled.max(at + interval)))
     }
 
@@ -150,34 +225,39 @@ impl SendQueueEstimate {
         }
         self.bytes = bytes as f64;
         let drained = self.sent - self.bytes;
+        let since = now.saturating_sub(round_trip.unwrap_or(DEFAULT_ROUND_TRIP) + FRAME_SPAN);
+        let recent: f64 =
+            self.frames.iter().filter(|(at, _)| *at >= since).map(|(_, bytes)| bytes).sum();
+        let recent = (OVERHEAD * recent).max(BUDGET[0]);
         let is_progress = drained > busy.most_drained;
         if is_progress {
             busy.progress = now;
             busy.most_drained = drained;
         }
-        busy.is_full |= self.bytes >= limit;
-        // Pauses can lower the rate over the whole period, but not raise it. In a short period, a
-        // relay or the buffers of the other host may have taken the bytes at once.
-        let whole = busy.whole.rate(now, drained);
+        let alone = busy.alone.filter(|_| bytes == 0);
+        let alone = alone.map(|bytes| LoneFrame { bytes, round_trip: now - busy.since });
         if bytes == 0 {
-            let sample = QueueSample {
-                alone: busy.alone.map(|bytes| LoneFrame { bytes, round_trip: now - busy.since }),
-                rate: whole,
-                is_full: false,
-            };
-            self.short_sample = whole.is_none().then_some(busy.whole);
             self.busy = None;
-            return sample;
         }
-        let start = SampleStart { at: now, drained };
-        let Some(before) = busy.sample else {
-            busy.sample = is_progress.then_some(start);
-            return QueueSample::default();
-        };
-        let Some(full_rate) = before.rate(now, drained) else { return QueueSample::default() };
-        busy.sample = Some(start);
-        let is_full = std::mem::replace(&mut busy.is_full, self.bytes >= limit);
-        let rate = if is_full { Some(full_rate.max(0.0)) } else { whole };
-        QueueSample { alone: None, rate, is_full }
+        // At first, the limit follows from the frames: the queue should empty in a round trip.
+        let limit = if self.settled_rate.is_finite() { limit } else { limit.min(recent) };
+        let was_full = self.is_full;
+        self.is_full = self.bytes > limit || was_full && !is_progress;
+        if was_full || self.is_full {
+            self.full_at = now;
+        }
+        let is_filled = self.is_full && !was_full;
+        let rate = if is_filled { self.filled(now, drained) } else { None };
+        QueueSample { alone, is_filled, rate }
+    }
+
+    /// Records that the queue has become full when `drained` bytes had left it. Returns the rate
+    /// since the queue became full before, and the time over which it is measured.
+    fn filled(&mut self, now: Duration, drained: f64) -> Option<(f64, Duration)> {
+        self.grows_at = self.grows_at.max(now + GROWTH_PAUSE[0]);
+        let earlier = self.filled.filter(|(since, _)| now <= *since + LONGEST_SAMPLE);
+        let (since, before) = *self.filled.insert(earlier.unwrap_or((now, drained)));
+        let span = now - since;
+        (span >= SHORTEST_SAMPLE).then(|| ((drained - before) / span.as_secs_f64(), span))
     }
 }
