@@ -20,6 +20,8 @@ echo "machine: $(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | xargs), $(n
 echo "connections by rate and round trip; 160x45 cells; from a key to the first change of the picture"
 echo "through a relay, which acknowledges the server's bytes at once:"
 cargo bench --quiet --bench link -- "$@"
+echo "through a relay that buffers 48 KiB, for terminals without replies:"
+cargo bench --quiet --bench link -- --buffer "no " "$@"
 echo "through a tunnel, so that the client acknowledges them a round trip later (needs root and python3):"
 cargo bench --quiet --bench link -- --tunnel "$@"
 echo "on a simulated connection, one wave at a time to 1,024 samples per pixel:"

@@ -2,7 +2,8 @@
 //! behind an OpenSSH server: directly, in tmux, and in screen.
 //!
 //! A relay on loopback limits the rate and delays all bytes. With `--tunnel`, a pair of TUN devices
-//! does this instead. The server's own TCP connection then has the simulated round-trip time.
+//! does this instead. The server's own TCP connection then has the simulated round-trip time. With
+//! `--buffer`, the relay buffers 48 KiB, as a jump host does.
 //! `benches/link.sh` installs the required programs.
 //!
 //! The arguments are a text and the number of keys. The bench measures only the table rows whose
@@ -54,6 +55,8 @@ fn main() {
     let part = arguments.iter().find(|a| !a.starts_with('-') && a.parse::<usize>().is_err());
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("room.toml"), MIRROR_ROOM).unwrap();
+    let has_buffer = arguments.iter().any(|argument| argument == "--buffer");
+    let buffer = relay::RECEIVE_BUFFERS[usize::from(has_buffer)];
     let has_tunnel = arguments.iter().any(|argument| argument == "--tunnel");
     println!(
         "{:50} {:>7} {:>7} {:>7} {:>5}  rate reported while and after the picture converges",
@@ -75,7 +78,7 @@ fn main() {
         };
         let address = match &tunnel {
             Some(_) => server.address,
-            None => Relay::start(server.address, link.1, link.2).unwrap().address,
+            None => Relay::start(server.address, link.1, link.2, buffer).unwrap().address,
         };
         for (name, row) in rows {
             if row.host.is_missing() {

@@ -11,10 +11,11 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Size in bytes of the receive buffer of the relay's socket to the server. The kernel acknowledges
-/// all bytes that reach the buffer, even if the relay has not read them yet. A large buffer would
-/// therefore accept bytes faster than the simulated connection.
-const RECEIVE_BUFFER: usize = 4 << 10;
+/// Sizes in bytes of the receive buffer of the relay's socket to the server, as a connection has it
+/// and as a jump host has it. The kernel acknowledges all bytes that reach the buffer, even if the
+/// relay has not read them yet. A large buffer therefore accepts bytes faster than the simulated
+/// connection.
+pub const RECEIVE_BUFFERS: [usize; 2] = [4 << 10, 48 << 10];
 /// Largest number of bytes that the relay forwards at once.
 const PIECE: usize = 700;
 
@@ -32,13 +33,19 @@ struct Pipe {
 
 impl Relay {
     /// Starts a relay to the server at `target`. The rate of the server's output is limited to
-    /// `rate` bytes per second. Both directions are delayed by `one_way`.
-    pub fn start(target: SocketAddr, rate: f64, one_way: Duration) -> io::Result<Self> {
+    /// `rate` bytes per second. Both directions are delayed by `one_way`. `buffer` is the size of the
+    /// receive buffer in bytes.
+    pub fn start(
+        target: SocketAddr,
+        rate: f64,
+        one_way: Duration,
+        buffer: usize,
+    ) -> io::Result<Self> {
         let listener = TcpListener::bind("127.0.0.1:0")?;
         let address = listener.local_addr()?;
         thread::spawn(move || {
             for client in listener.incoming().flatten() {
-                let Ok(server) = connected(target) else { continue };
+                let Ok(server) = connected(target, buffer) else { continue };
                 let _ = client.set_nodelay(true).and_then(|()| server.set_nodelay(true));
                 let (Ok(up), Ok(down)) = (client.try_clone(), server.try_clone()) else { continue };
                 forward(up, server, f64::INFINITY, one_way);
@@ -49,10 +56,10 @@ impl Relay {
     }
 }
 
-/// Connects to the server at `target` with a small receive buffer.
-fn connected(target: SocketAddr) -> io::Result<TcpStream> {
+/// Connects to the server at `target` with a receive buffer of `buffer` bytes.
+fn connected(target: SocketAddr, buffer: usize) -> io::Result<TcpStream> {
     let socket = socket(AddressFamily::INET, SocketType::STREAM, None)?;
-    set_socket_recv_buffer_size(&socket, RECEIVE_BUFFER)?;
+    set_socket_recv_buffer_size(&socket, buffer)?;
     connect(&socket, &target)?;
     Ok(TcpStream::from(socket))
 }

@@ -7,7 +7,7 @@
 //! connection. The bytes that the relay then holds follow from this rate and the frames sent; no
 //! frame is sent until they have been transmitted.
 
-use crate::flow::{BUDGET, DEFAULT_ROUND_TRIP, FRAME_SPAN, MIN_RATE};
+use crate::flow::{BUDGET, DEFAULT_ROUND_TRIP, FRAME_SPAN, MIN_RATE, SMALL};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -26,11 +26,8 @@ const LONGEST_SAMPLE: Duration = Duration::from_secs(3);
 const CONVINCING_SAMPLE: Duration = Duration::from_millis(500);
 /// Factors by which the rate grows in a round trip: before and after its first measurement.
 const GROWTH: [f64; 2] = [1.12, 1.03];
-/// Shortest and longest pause of the growth after the queue became full.
+/// Pauses of the growth after the queue became full: without a relay, and with one, which it fills.
 const GROWTH_PAUSE: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(15)];
-/// Ratio of the pause of the growth, which fills a relay, to the time in which the relay becomes
-/// empty.
-const PAUSE_RATIO: f64 = 60.0;
 /// Time after the first measurement of the rate in which the capacity of a relay is measured.
 const LEARNING_TIME: Duration = Duration::from_secs(6);
 /// Share of the rate at which frames are sent, so that a relay becomes empty.
@@ -185,9 +182,8 @@ impl SendQueueEstimate {
         while self.relayed(now, settled) > self.capacity {
             self.frames.pop_front();
         }
-        let pause = PAUSE_RATIO * self.relayed(now, settled) / settled;
-        self.grows_at =
-            now + (GROWTH_PAUSE[0] + Duration::from_secs_f64(pause)).min(GROWTH_PAUSE[1]);
+        let has_relay = self.relayed(now, settled) > SMALL as f64;
+        self.grows_at = now + GROWTH_PAUSE[usize::from(has_relay)];
         settled
     }
 
