@@ -346,6 +346,7 @@ mod tests {
             ("mtllib ../x.mtl\n", "no colours: \"../x.mtl\" is not in the mesh's folder"),
             ("f 1 2\nf 1\n", "a face of fewer than three corners was left out (2 times)"),
             ("f 1 1 2\n", "a triangle without area was left out"),
+            ("vn 0 0 1\nf 1//1 2//1 3//1\n", "a normal that is missing was computed (6 times)"),
             (
                 "v 0 1.5 0\nf 1 3 2 5\n",
                 "a polygon whose outline crosses itself or is too long is uncertain",
