@@ -68,6 +68,8 @@ fn may_pass(kind: ErrorKind) -> bool {
         ErrorKind::InvalidInput,
         ErrorKind::IsADirectory,
         ErrorKind::Unsupported,
+        // Another process has created the file.
+        ErrorKind::WouldBlock,
     ];
     !lasting.contains(&kind)
 }
