@@ -71,7 +71,10 @@ impl CheckpointWriter {
             std::thread::spawn(move || {
                 let mut claim = claim.lock().unwrap_or_else(PoisonError::into_inner);
                 let written = checkpoint.map_or(Ok(()), |checkpoint| {
-                    claim.replace(|path| checkpoint.write(path, Existing::Replace))
+                    claim.check()?;
+                    let file = checkpoint.write(claim.path(), Existing::Replace)?;
+                    claim.keep(file);
+                    Ok(())
                 });
                 // The receiver has been dropped if the render has failed.
                 let _ = sender.send(written);

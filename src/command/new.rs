@@ -9,7 +9,7 @@ use zerkalo_scene::disk::{Existing, replace_file};
 const STARTER: &str = include_str!("starter.toml");
 
 pub fn run(path: &Path) -> Result<(), Failure> {
-    replace_file(path, Existing::Refuse, |file| file.write_all(STARTER.as_bytes()))?;
+    replace_file(path, Existing::Refuse, |file| file.write_all(STARTER.as_bytes())).map(drop)?;
     let shown = path.display();
     print_line(&format!("{shown} written; `zerkalo render {shown} -o PICTURE.png` renders it"))
 }

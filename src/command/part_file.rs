@@ -2,6 +2,7 @@
 
 use crate::command::Failure;
 use crate::command::progress::{counts, noise};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use zerkalo_render::RenderState;
 use zerkalo_render::export::{Provenance, film_header};
@@ -33,8 +34,8 @@ impl FilmOutput {
     }
 
     /// Writes `film`. A picture uses the light weights, the display transform and the metadata of
-    /// `header`.
-    pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
+    /// `header`. Returns the file with its lock.
+    pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<File, WriteError> {
         match self {
             Self::Film(path) => EncodedFilm::new(header, film, None).write(path, Existing::Replace),
             Self::Picture(output, depth) => output.write(header, *depth, &mut &*film),
@@ -46,8 +47,15 @@ pub fn is_film(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zk"))
 }
 
-/// Writes the film of `state`, which holds the samples of `part`. Returns the report on the film.
-pub fn write(output: &FilmOutput, state: &RenderState, part: &Part) -> Result<Report, WriteError> {
+/// File of a part that was written.
+pub struct Written {
+    /// The file with its lock.
+    pub file: File,
+    pub report: Report,
+}
+
+/// Writes the film of `state`, which holds the samples of `part`.
+pub fn write(output: &FilmOutput, state: &RenderState, part: &Part) -> Result<Written, WriteError> {
     let settings = &part.plan.settings;
     let provenance = Provenance {
         source: settings.source.clone(),
@@ -58,7 +66,7 @@ pub fn write(output: &FilmOutput, state: &RenderState, part: &Part) -> Result<Re
     let report = Report::of_film(&state.film, &state.weights, &settings.display);
     let mut header = film_header(state, &report, &provenance);
     part.record(&mut header);
-    output.write(&state.film, &header).map(|()| report)
+    output.write(&state.film, &header).map(|file| Written { file, report })
 }
 
 /// Formats sample counts and noise, such as `212 spp (32-900) noise 0.250 8-bit levels`.

@@ -90,7 +90,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         shards: vec![PartShard { number: BASE, complete: true }],
         rays: schedule.rays,
     };
-    let report = part_file::write(&FilmOutput::Film(base_file.clone()), state, &part)?;
+    let report = part_file::write(&FilmOutput::Film(base_file.clone()), state, &part)?.report;
     print_line(&format!(
         "{}  {}  {} rays  {:.2} s  (pilot, the base of the plan)",
         base_file.display(),

@@ -140,7 +140,7 @@ fn as_a_whole(
             let world = state.world.info();
             output
                 .write(&header, depth, &mut &state.film)
-                .map(|()| (report.clone(), world.precision, world.biases.clone()))
+                .map(|_| (report.clone(), world.precision, world.biases.clone()))
         });
         results.transpose()
     });

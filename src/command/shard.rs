@@ -65,7 +65,10 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     let mut write = |render: &ShardRender, complete| {
         part.shards.iter_mut().for_each(|shard| shard.complete = complete);
         part.rays = render.rays;
-        claim.replace(|_| part_file::write(&output, &render.state, &part))
+        claim.check()?;
+        let written = part_file::write(&output, &render.state, &part)?;
+        claim.keep(written.file);
+        Ok(written.report)
     };
     let mut checkpoint = |render: &ShardRender| match output {
         FilmOutput::Film(_) => write(render, false).map(drop),

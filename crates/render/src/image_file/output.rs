@@ -3,6 +3,7 @@
 use crate::film::Film;
 use crate::film::file::FilmFileHeader;
 use crate::image_file::{exr_writer, png_writer};
+use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 use zerkalo_scene::disk::{Existing, Replacement, WriteError, replace_file};
@@ -86,12 +87,14 @@ impl ImageOutput {
     /// A key of the metadata has 1 to 79 printable ASCII characters without leading, trailing or
     /// double spaces. It begins with an upper-case letter, because the keys that OpenEXR itself
     /// defines begin with lower-case letters.
+    ///
+    /// Returns the file with its lock.
     pub fn write(
         &self,
         header: &FilmFileHeader,
         depth: Depth,
         bands: &mut dyn Bands,
-    ) -> Result<(), WriteError> {
+    ) -> Result<File, WriteError> {
         replace_file(&self.path, self.existing, |file| {
             let mut out = BufWriter::with_capacity(1 << 16, file);
             (FORMATS[self.format].encode)(header, depth, bands, &mut out)?;

@@ -23,8 +23,22 @@ impl Claim {
     /// # Errors
     /// Returns [`ErrorKind::WouldBlock`] if another process holds the claim.
     pub fn new(path: &Path) -> Result<Self, WriteError> {
-        let mut claim = Self { path: path.to_path_buf(), locked: None, owned: false };
-        claim.renew().map(|()| claim)
+        let claim = |locked, owned| Self { path: path.to_path_buf(), locked, owned };
+        // Another process may replace the file between the opening and the lock.
+        loop {
+            let Ok(file) = open_regular(path) else {
+                return Ok(claim(None, path.exists()));
+            };
+            match file.try_lock() {
+                Err(TryLockError::WouldBlock) => return Err(refused(path)),
+                Err(TryLockError::Error(_)) => return Ok(claim(None, true)),
+                Ok(()) => {}
+            }
+            let inode = file.metadata().map(|opened| opened.ino()).ok();
+            if inode == fs::metadata(path).map(|named| named.ino()).ok() {
+                return Ok(claim(Some(file), true));
+            }
+        }
     }
 
     /// Returns `true` if the file exists, but its file system has no locks.
@@ -32,74 +46,58 @@ impl Claim {
         self.owned && self.locked.is_none()
     }
 
-    /// Calls `write`, which replaces the file, and claims the new one.
+    /// Path of the claimed file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Checks that the file may be replaced.
     ///
     /// # Errors
-    /// Fails with the error of `write`, or if another process has created the file in the meantime.
-    pub fn replace<T>(
-        &mut self,
-        write: impl FnOnce(&Path) -> Result<T, WriteError>,
-    ) -> Result<T, WriteError> {
-        if !self.owned && self.path.exists() {
-            return Err(self.refused());
-        }
-        let result = write(&self.path)?;
-        self.renew().map(|()| result)
+    /// Fails if another process has created the file after this claim.
+    pub fn check(&self) -> Result<(), WriteError> {
+        if self.owned || !self.path.exists() { Ok(()) } else { Err(refused(&self.path)) }
     }
 
-    /// Locks the file that is at the path now.
-    fn renew(&mut self) -> Result<(), WriteError> {
-        // Another process may replace the file between the opening and the lock.
-        loop {
-            let Ok(file) = open_regular(&self.path) else {
-                self.owned = self.path.exists();
-                return Ok(());
-            };
-            match file.try_lock() {
-                Err(TryLockError::WouldBlock) => return Err(self.refused()),
-                Err(TryLockError::Error(_)) => {
-                    self.owned = true;
-                    return Ok(());
-                }
-                Ok(()) => {}
-            }
-            let inode = file.metadata().map(|opened| opened.ino()).ok();
-            if inode == fs::metadata(&self.path).map(|named| named.ino()).ok() {
-                (self.locked, self.owned) = (Some(file), true);
-                return Ok(());
-            }
-        }
+    /// Continues the claim with `file`, which has replaced the claimed file. It was written with
+    /// its lock, so that there is no moment at which another process can claim it.
+    pub fn keep(&mut self, file: File) {
+        // A file system without locks does not lock this file either.
+        (self.locked, self.owned) = (Some(file), true);
     }
+}
 
-    fn refused(&self) -> WriteError {
-        let what = "another process is writing it";
-        let remedy = "wait until that process ends or name another file";
-        WriteError::new(&self.path, ErrorKind::WouldBlock, what, remedy)
-    }
+fn refused(path: &Path) -> WriteError {
+    let what = "another process is writing it";
+    let remedy = "wait until that process ends or name another file";
+    WriteError::new(path, ErrorKind::WouldBlock, what, remedy)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::disk::{Existing, replace_file};
 
     #[test]
     fn one_process_at_a_time_replaces_a_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.zk");
-        let write = |path: &Path| crate::disk::write(path, b"film");
+        let write = || replace_file(&path, Existing::Replace, |_| Ok(())).unwrap();
         let mut early = Claim::new(&path).unwrap();
-        let mut other = Claim::new(&path).unwrap();
-        early.replace(write).unwrap();
-        for error in [other.replace(write).unwrap_err(), Claim::new(&path).unwrap_err()] {
+        let other = Claim::new(&path).unwrap();
+        early.keep(write());
+        for error in [other.check().unwrap_err(), Claim::new(&path).unwrap_err()] {
             assert_eq!(error.kind, ErrorKind::WouldBlock);
             assert!(error.to_string().contains("another process is writing it"), "{error}");
         }
         // The new file is claimed, too.
-        early.replace(write).unwrap();
+        let file = write();
         assert!(Claim::new(&path).is_err());
+        early.keep(file);
+        assert!(early.check().is_ok() && Claim::new(&path).is_err());
         drop(early);
         let mut next = Claim::new(&path).unwrap();
-        next.replace(write).unwrap();
+        next.keep(write());
         assert!(!next.is_unlocked());
     }
 }

@@ -125,11 +125,12 @@ impl Replacement {
     }
 
     /// Stores the content of the temporary file on the disk, then renames it to the requested file.
+    /// Returns the file, which stays locked while it is open.
     ///
     /// # Errors
     /// Fails if the content cannot be stored or the file cannot be replaced; an existing file is
     /// then unchanged.
-    pub fn commit(self) -> Result<(), WriteError> {
+    pub fn commit(self) -> Result<File, WriteError> {
         let synced = self.temporary.as_file().sync_all();
         synced.map_err(|error| self.explain(&error))?;
         let Self { path, target, folder, existing, exists, temporary } = self;
@@ -137,12 +138,12 @@ impl Replacement {
             Existing::Replace => temporary.persist(&target),
             Existing::Refuse => temporary.persist_noclobber(&target),
         };
-        renamed.map_err(|e| explain(&path, &folder, exists, &e.error))?;
+        let file = renamed.map_err(|e| explain(&path, &folder, exists, &e.error))?;
         // Stores the new name on the disk. Some systems cannot open or synchronise a directory.
         if let Ok(directory) = File::open(&folder) {
             let _ = directory.sync_all();
         }
-        Ok(())
+        Ok(file)
     }
 }
 
@@ -185,10 +186,11 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
             WriteError::new(path, error.kind(), error.to_string(), "name another file")
         });
     }
-    replace_file(path, Existing::Replace, |file| file.write_all(bytes))
+    replace_file(path, Existing::Replace, |file| file.write_all(bytes)).map(drop)
 }
 
-/// Writes the file at `path` by a [`Replacement`], which `write` fills.
+/// Writes the file at `path` by a [`Replacement`], which `write` fills. Returns the file, which
+/// stays locked while it is open.
 ///
 /// # Errors
 /// Fails if `write` fails or the file cannot be written; an existing file is then unchanged.
@@ -196,7 +198,7 @@ pub fn replace_file(
     path: &Path,
     existing: Existing,
     write: impl FnOnce(&mut NamedTempFile) -> io::Result<()>,
-) -> Result<(), WriteError> {
+) -> Result<File, WriteError> {
     let mut replacement = Replacement::begin(path, existing)?;
     let written = write(&mut replacement.temporary);
     written.map_err(|error| replacement.explain(&error))?;
@@ -310,7 +312,7 @@ mod tests {
     use super::*;
     use std::os::unix::fs::{lchown, symlink};
 
-    fn message(result: Result<(), WriteError>) -> String {
+    fn message<T: fmt::Debug>(result: Result<T, WriteError>) -> String {
         result.unwrap_err().to_string()
     }
 

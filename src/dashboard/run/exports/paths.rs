@@ -14,10 +14,10 @@ const MOST: u32 = 100_000;
 ///
 /// # Errors
 /// Fails with the error of `write`, or with a message if no name is unused.
-pub fn numbered<E: Display>(
+pub fn numbered<T, E: Display>(
     stem: &str,
     extension: &str,
-    write: impl Fn(&Path) -> Result<(), E>,
+    write: impl Fn(&Path) -> Result<T, E>,
 ) -> Result<PathBuf, String> {
     // A symbolic link takes a path even without a target.
     let is_taken = |path: &Path| path.symlink_metadata().is_ok();
@@ -27,7 +27,7 @@ pub fn numbered<E: Display>(
             continue;
         }
         match write(&path) {
-            Ok(()) => return Ok(path),
+            Ok(_) => return Ok(path),
             // Another program has created a file of this name meanwhile.
             Err(_) if is_taken(&path) => {}
             Err(error) => return Err(error.to_string()),

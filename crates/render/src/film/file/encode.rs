@@ -5,6 +5,7 @@ use crate::film::file::{
 };
 use crate::film::store::Film;
 use rayon::prelude::*;
+use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 use zerkalo_scene::disk::{Existing, WriteError, replace_file};
@@ -70,8 +71,8 @@ impl EncodedFilm {
     }
 
     /// Writes the file at `path`, in one step. `existing` decides if a file there may be replaced.
-    /// After an error an existing file is unchanged.
-    pub fn write(&self, path: &Path, existing: Existing) -> Result<(), WriteError> {
+    /// After an error an existing file is unchanged. Returns the file with its lock.
+    pub fn write(&self, path: &Path, existing: Existing) -> Result<File, WriteError> {
         replace_file(path, existing, |file| {
             self.pieces.iter().try_for_each(|piece| file.write_all(piece))
         })
