@@ -91,7 +91,7 @@ impl UpdateContext<'_> {
                 self.show();
             }
             _ => {
-                self.model.quit_when_saved = false;
+                self.decline();
                 self.model.overlay = None;
             }
         }

@@ -2,6 +2,7 @@
 
 use crate::Scene;
 use crate::TransformOp;
+use crate::edit::add::fit_mesh;
 use crate::edit::convert;
 use crate::edit::convert::{AIM, KIND};
 use crate::edit::parse_value::{parse, word};
@@ -45,7 +46,8 @@ pub fn set(scene: &Scene, target: &Target, key: &str, text: &str) -> Result<Edit
     if let (Target::Light(i), "falloff") = (target, key) {
         return convert::switch_falloff(scene, *i, value);
     }
-    replace(scene, target, key, value)
+    let edit = replace(scene, target, key, value)?;
+    if key == "shape.mesh.file" { fit_mesh(scene, edit) } else { Ok(edit) }
 }
 
 /// Sets the number at index `component` of the value of `key`.
