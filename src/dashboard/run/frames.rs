@@ -249,7 +249,7 @@ impl FramePipeline {
         bytes.extend(std::mem::take(&mut self.clipboard).as_bytes());
         if self.link[0] != self.link[1] {
             bytes.extend(self.link[0].as_deref().unwrap_or_default().as_bytes());
-            self.link[1].clone_from(&self.link[0]);
+            self.link[1] = self.link[0].clone();
         }
         bytes.extend(self.flow.ack_request().unwrap_or_default().as_bytes());
         self.flow.sent(now, bytes.len(), frame.picture, frame.flushed);

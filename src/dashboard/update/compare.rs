@@ -3,7 +3,8 @@
 use crate::dashboard::update::{Direction, cycled};
 use crate::dashboard::{DisplayChannel, Effect, Mode, UpdateContext};
 use std::sync::Arc;
-use zerkalo_render::film::{LinearImage, Tone, linear};
+use zerkalo_render::film::{LinearImage, Tone};
+use zerkalo_terminal::cells::linear;
 
 /// Change of the exposure per step, in stops.
 const EXPOSURE_STEP: f64 = 0.25;

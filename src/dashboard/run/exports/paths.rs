@@ -43,7 +43,8 @@ pub fn full(path: &Path) -> String {
 
 /// Returns the URL of the file at `path` on this machine, for links in the terminal.
 pub fn url(path: &Path) -> String {
-    let encoded = full(path).bytes().map(|byte| match byte {
+    let path = full(path);
+    let encoded = path.bytes().map(|byte| match byte {
         b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' | b'~' => {
             char::from(byte).to_string()
         }
