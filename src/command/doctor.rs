@@ -221,13 +221,13 @@ fn whole_frames(terminal: &Capabilities) -> &'static str {
 
 fn stills(terminal: &Capabilities) -> String {
     let missing = match Protocol::of(terminal) {
-        Protocol::Sixel(colors) => return format!("crisp, by sixel in {colors} colours"),
+        Protocol::Sixel(colors) => return format!("crisp on o, by sixel in {colors} colours"),
         Protocol::Blocks if terminal.kitty_graphics => "its kitty's protocol has no placeholders",
         Protocol::Blocks if terminal.sixel => "sixel needs the size of a cell in pixels",
         Protocol::Blocks => "neither kitty's protocol nor sixel",
-        protocol => return format!("crisp, by {}", protocol.name()),
+        protocol => return format!("crisp on o, by {}", protocol.name()),
     };
-    format!("in half blocks: {missing}")
+    format!("on o in half blocks: {missing}")
 }
 
 fn acknowledgement(mode: PacingMode) -> &'static str {
@@ -298,7 +298,7 @@ mod tests {
             "24-bit colour: COLORTERM=truecolor",
             "#1e1e2e, dark",
             "shown at once",
-            "crisp, by kitty's protocol\n",
+            "crisp on o, by kitty's protocol\n",
             "UTF-8: LANG=",
             "1.2 ms",
         ];

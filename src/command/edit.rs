@@ -5,6 +5,7 @@ use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, warn, write_line};
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{Ended, FaultyFile, Setup, run as run_dashboard};
+use crate::dashboard::scene_source::SceneSource;
 use std::env;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
@@ -32,9 +33,10 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let assets = reporter.assets.clone();
     let file = match (&checkpoint, &args.scene) {
         (Some(checkpoint), _) => Ok(scene_of(checkpoint, assets)?),
-        (None, Some(path)) => SceneFile::open_with(path, assets)
+        (None, Some(path)) => SceneSource::File(path.clone())
+            .open(assets)
             .map_err(|errors| FaultyFile { path: path.clone(), errors }),
-        (None, None) => Ok(SceneFile::untitled(OPENING.to_string(), OPENING_NAME)?),
+        (None, None) => Ok(SceneSource::BuiltIn(0).open(assets)?),
     };
     if let Err(FaultyFile { path, errors }) = &file
         && open_regular(path).is_err()
@@ -64,11 +66,6 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     };
     conclude(&run_dashboard(setup)?, io::stdout().lock())
 }
-
-/// Text of the scene that the dashboard opens without a file.
-const OPENING: &str = include_str!("../../scenes/lamp-and-mirror.toml");
-/// File name under which [`OPENING`] is saved.
-const OPENING_NAME: &str = "lamp-and-mirror.toml";
 
 /// Prints the results of a dashboard: names of written files on `out`, everything else on stderr.
 /// After a signal, returns the signal's exit status as an error, even if printing failed.

@@ -23,6 +23,7 @@ mod watch;
 
 pub use cpu::require as require_cpu;
 
+use crate::dashboard::scene_source::{BUILT_IN, SceneSource};
 use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
@@ -166,8 +167,15 @@ fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
     }
 }
 
-/// Reads a scene file. Messages on stderr report the loading of large files.
+/// Reads a scene file, or a built-in scene if `path` is its name. Messages on stderr report the loading of large files.
 fn read_scene(path: &Path) -> Result<Document, Failure> {
+    let name = path.to_string_lossy();
+    if let SceneSource::BuiltIn(index) = SceneSource::of(name.trim_end_matches(".toml"))
+        && !path.exists()
+    {
+        let (name, text) = BUILT_IN[index];
+        return Ok(Document::parse(text.to_string(), &format!("{name}.toml"))?);
+    }
     Ok(Document::read(path, LoadReporter::new().assets)?)
 }
 

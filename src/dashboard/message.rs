@@ -1,10 +1,11 @@
 //! Messages that `update` receives, and effects that it returns.
 
+use crate::dashboard::SceneSource;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use zerkalo_render::film::{Display, LinearImage};
-use zerkalo_render::schedule::Stop;
+use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{Snapshot, View, WatchReport};
 use zerkalo_scene::{SaveError, Scene, SceneErrors};
 use zerkalo_terminal::event::{Key, Mouse};
@@ -29,8 +30,16 @@ pub enum Message {
     Saved(Arc<Scene>, Result<PathBuf, SaveError>),
     /// Result of [`Effect::Load`].
     Loaded(Box<Result<Arc<Scene>, SceneErrors>>),
-    /// Another program has changed the scene file.
+    /// Another program has written a valid scene to the scene file.
     ChangedOnDisk,
+    /// Another program has written errors to the scene file.
+    BrokenOnDisk(SceneErrors),
+    /// The scene file is again as it was before another program wrote errors to it.
+    MendedOnDisk,
+    /// Result of [`Effect::Open`].
+    Opened(Box<Result<OpenedScene, SceneErrors>>),
+    /// Result of [`Effect::ListScenes`]: names for [`SceneSource::of`], each with a note.
+    Scenes(Vec<(String, &'static str)>),
     /// Another program has changed a mesh or image of the scene.
     AssetsChanged,
     OrphanedEdits(OrphanedEdits),
@@ -38,8 +47,8 @@ pub enum Message {
     Warning(String),
     /// Written image or checkpoint, or the reason why it could not be written.
     Exported(Result<Exported, String>),
-    /// Progress of [`Effect::ExportSized`], 0..=1; `None` at its end.
-    ExportProgress(Option<f64>),
+    /// Progress of [`Effect::ExportSized`], 0..=1, and time until its end; `None` at its end.
+    ExportProgress(Option<(f64, Option<Interval>)>),
     /// Result of [`Effect::ViewImage`] for the file at this path.
     ViewerImage(PathBuf, Result<Arc<ViewerImage>, String>),
     /// Fraction of the viewed image that the terminal has received, 0..=1.
@@ -48,6 +57,16 @@ pub enum Message {
     ConnectionRate(Option<f64>),
     /// Time has passed, so that the notice disappears.
     Tick,
+}
+
+/// Scene that replaces the present one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpenedScene {
+    pub scene: Arc<Scene>,
+    pub path: Option<PathBuf>,
+    pub name: String,
+    /// `true` if the file does not exist yet.
+    pub is_new: bool,
 }
 
 /// Unsaved edits that a crashed run of the program has left.
@@ -159,6 +178,10 @@ pub enum Effect {
     },
     /// Read the scene file again.
     Load,
+    /// Replace the scene by another one. The recovery file of the present one is removed.
+    Open(SceneSource),
+    /// List the scenes that can be opened.
+    ListScenes,
     /// Write the current picture as an image with the next free name, such as `room-2.png`.
     Export(Format),
     /// Write the samples of this scene as a checkpoint with the next free name.

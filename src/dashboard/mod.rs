@@ -19,6 +19,7 @@ pub mod overlay;
 pub mod overlay_layout;
 pub mod panel_lines;
 pub mod run;
+pub mod scene_source;
 #[cfg(test)]
 mod testing;
 pub mod text;
@@ -30,8 +31,9 @@ use convergence::Convergence;
 use editor::Editor;
 use key_context::KeyContext;
 use layout::{BORDER, Focus, Layout};
-use message::{DisplayChannel, Effect, Exported, Format, Message, OrphanedEdits};
+use message::{DisplayChannel, Effect, Exported, Format, Message, OpenedScene, OrphanedEdits};
 use model::{Drag, FieldList, Mode, Model, WatchTable, short_name};
 use overlay::{Answer, Form, Overlay, Pick, PickEntry, Prompt, Question, ViewedImage};
 use panel_lines::{FieldLine, ListCursor, OutlineEntry, OutlineLine, PanelLine};
+use scene_source::SceneSource;
 use update::UpdateContext;

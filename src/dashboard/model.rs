@@ -1,13 +1,14 @@
 //! Model: the complete state of the dashboard, from which the screen is drawn.
 
 use crate::dashboard::{
-    Convergence, DisplayChannel, Editor, Focus, KeyContext, ListCursor, OrphanedEdits, Overlay,
+    Convergence, DisplayChannel, Editor, Focus, Format, KeyContext, ListCursor, OrphanedEdits,
+    Overlay, SceneSource,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use zerkalo_render::film::{Display, LinearImage, PixelProbe};
-use zerkalo_render::schedule::Stop;
+use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{Snapshot, WatchReport};
 use zerkalo_scene::edit::Target;
 use zerkalo_scene::value::sanitized;
@@ -43,6 +44,8 @@ pub struct File {
     pub broken: Option<SceneErrors>,
     /// Path of the last save that was refused because a file exists there.
     pub occupied: Option<PathBuf>,
+    /// `true` if the file does not exist until the scene is saved.
+    pub is_new: bool,
     /// `true` if the file has been unreadable since the start. There is no scene then, and the
     /// dashboard shows only the errors in `broken`.
     pub unreadable: bool,
@@ -109,8 +112,10 @@ pub struct WatchTable {
 pub struct RunningExport {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Progress of the render, 0..=1.
+    /// Largest progress of the render so far, 0..=1.
     pub progress: f64,
+    /// Time until its end, if it can be estimated.
+    pub left: Option<Interval>,
 }
 
 /// Drag, which lasts from the press of a mouse button to its release.
@@ -172,6 +177,10 @@ pub struct Model {
     pub last_edit: Option<Duration>,
     /// `true` if the program quits as soon as the pending save has succeeded.
     pub quit_when_saved: bool,
+    /// Scene that opens as soon as the unsaved edits are saved or discarded.
+    pub next_scene: Option<SceneSource>,
+    /// Format of the picture that is written as soon as the render ends.
+    pub export_when_done: Option<Format>,
     /// Unsaved edits of a crashed run, until they are recovered or discarded.
     pub orphaned_edits: Option<OrphanedEdits>,
     /// Scene of the last autosave; `None` if there were no unsaved edits at that time.
@@ -225,6 +234,7 @@ impl Model {
                 saved: Arc::clone(&scene),
                 broken,
                 occupied: None,
+                is_new: false,
                 unreadable,
             },
             history: History::new(scene),
@@ -240,6 +250,11 @@ impl Model {
             Some(Overlay::Form(form)) => &form.scene,
             _ => self.history.scene(),
         }
+    }
+
+    /// Returns `true` if there is no object to see.
+    pub fn is_empty(&self) -> bool {
+        self.watch.is_none() && !self.file.unreadable && self.scene().objects.is_empty()
     }
 
     pub fn is_unsaved(&self) -> bool {

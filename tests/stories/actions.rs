@@ -3,7 +3,9 @@
 use super::*;
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::model::{Colors, Mode};
+use zerkalo::dashboard::scene_source::SceneSource;
 use zerkalo_scene::camera::Focus as LensFocus;
+use zerkalo_scene::material::Preset;
 
 const BALL: Target = Target::Object(1);
 const GLASS: Target = Target::Object(2);
@@ -203,6 +205,13 @@ fn object_stories() -> Vec<Story> {
             (0.01..0.02).contains(&normal(d)[0])
         }),
         selected("snap the selection to ground", BALL, "g", |_, d| ball(d) == [0.0, 0.5, 0.0]),
+        selected("make the selection gold, glass, …", BALL, "S `gold` Enter", |_, d| {
+            let material = &d.scene().objects[1].material;
+            material == "gold" && d.scene().materials["gold"].preset == Some(Preset::Gold)
+        }),
+        selected("remove unused materials", BALL, ":", |_, d| {
+            d.notice().contains("every material is used")
+        }),
         selected("give the object its own material", BALL, "M", |a, d| {
             let material = &d.scene().objects[1].material;
             material != "red" && d.scene().materials[material] == a.materials["red"]
@@ -259,6 +268,12 @@ fn file_stories() -> Vec<Story> {
         }),
         story("read the file again", "Ctrl-o", |_, d| d.asked(|e| *e == Effect::Load)),
         story("recover edits of a crashed session", ":", |_, d| d.notice().contains("No session")),
+        story("new scene", "Left Ctrl-n", |_, d| d.model.next_scene == Some(SceneSource::New)),
+        story(
+            "open another scene",
+            "O",
+            |_, d| matches!(&d.model.overlay, Some(Overlay::Pick(pick)) if pick.entries.len() == 2),
+        ),
         story("suspend to the shell", "Ctrl-z", |_, d| d.asked(|e| *e == Effect::Suspend)),
         story("quit", "q", |_, d| d.asked(|e| *e == Effect::Quit)),
     ]
@@ -282,6 +297,7 @@ fn picture_stories() -> Vec<Story> {
         story("exposure up", "=", |_, d| d.model.display.exposure_ev == 0.25),
         story("exposure down", "-", |_, d| d.model.display.exposure_ev == -0.25),
         story("exposure 0", "= = 0", |_, d| d.model.display.exposure_ev == 0.0),
+        story("exposure from the picture", "E", |_, d| d.notice().contains("picture is black")),
         story("next tone curve", "t", |_, d| {
             d.model.display.tone == Tone::Neutral && d.asked(|e| matches!(e, Effect::Display(_)))
         }),

@@ -2,6 +2,7 @@
 //! renderer or disk.
 
 mod actions;
+mod beginning;
 mod editing;
 mod files;
 mod mouse;
@@ -15,7 +16,7 @@ mod watch;
 use crate::harness::*;
 use simulated_dashboard::{Desk, FILE, ROOM};
 use zerkalo::dashboard::message::{
-    DisplayChannel, Effect, Exported, Format, Message, OrphanedEdits,
+    DisplayChannel, Effect, Exported, Format, Message, OpenedScene, OrphanedEdits,
 };
 use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::overlay::Overlay;

@@ -3,6 +3,7 @@
 
 use super::*;
 use zerkalo::dashboard::editor::Editor;
+use zerkalo::dashboard::scene_source::{NEW, SceneSource};
 use zerkalo_render::film::LinearImage;
 
 /// Path of the scene file.
@@ -95,6 +96,14 @@ impl Desk {
         desk
     }
 
+    /// Opens the dashboard on a scene file that does not exist.
+    pub fn on_new_file() -> Self {
+        let mut desk = Self::new(NEW);
+        desk.disk.clear();
+        desk.model.file.is_new = true;
+        desk
+    }
+
     /// Returns the text that a save would write to the scene file.
     pub fn text(&self) -> String {
         let mut document = self.document.clone();
@@ -148,6 +157,30 @@ impl Desk {
                     self.document = document.clone();
                 }
                 Message::Loaded(Box::new(read.map(|d| Arc::new(d.scene().clone()))))
+            }
+            Effect::ListScenes => Message::Scenes(vec![
+                (FILE.to_string(), "file"),
+                ("lamp-and-mirror".to_string(), "built in"),
+            ]),
+            Effect::Open(source) if self.reads => {
+                let name = match &source {
+                    SceneSource::File(path) => path.display().to_string(),
+                    SceneSource::New | SceneSource::BuiltIn(_) => String::new(),
+                };
+                let text = self.disk.get(Path::new(&name)).cloned();
+                let read = match text {
+                    Some(text) => Document::parse(text, &name),
+                    None => source.open(Arc::default()).map(|file| file.document),
+                };
+                Message::Opened(Box::new(read.map(|document| {
+                    self.document = document;
+                    OpenedScene {
+                        scene: Arc::new(self.document.scene().clone()),
+                        path: (!name.is_empty()).then(|| name.clone().into()),
+                        is_new: !self.disk.contains_key(Path::new(&name)),
+                        name: self.document.name.clone(),
+                    }
+                })))
             }
             Effect::Export(format) => Message::Exported(Ok(Exported {
                 path: format!("room-1.{}", format.extension()).into(),

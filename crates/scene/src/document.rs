@@ -80,6 +80,19 @@ impl Document {
         self.scene = Arc::new(scene.clone());
     }
 
+    /// Removes the comment at the top of the text that an empty line separates from the rest.
+    pub fn drop_header(&mut self) {
+        let body = |text: &str| {
+            let lines = text.split_inclusive('\n').take_while(|line| line.starts_with('#'));
+            let header: usize = lines.map(str::len).sum();
+            let body = text[header..].trim_start_matches(['\r', '\n']);
+            let is_apart = text[header..].trim_start_matches('\r').starts_with('\n');
+            Arc::new(if is_apart { body } else { text }.to_string())
+        };
+        self.origin.0 = body(&self.origin.0);
+        self.text = body(&self.text);
+    }
+
     /// Returns the scene that the text describes.
     pub fn scene(&self) -> &Scene {
         &self.scene

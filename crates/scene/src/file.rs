@@ -171,7 +171,8 @@ impl SceneFile {
         self.write(self.described(scene), &path, true)
     }
 
-    /// Writes the valid `scene` to the file at `path`, which becomes the scene's file. Fails if
+    /// Writes the valid `scene` to the file at `path`, which becomes the scene's file. The comment at
+    /// the top of the old file, which describes the old scene, is kept only in a copy of it. Fails if
     /// this file exists (unless `overwrite`), or if a file that the scene names would not be found
     /// from the new folder.
     pub fn save_as(
@@ -190,6 +191,9 @@ impl SceneFile {
             });
         }
         let mut document = self.described(scene);
+        if self.path.as_deref() != Some(path) && document.text() != self.document.text() {
+            document.drop_header();
+        }
         document.name = path.display().to_string();
         self.write(document, path, overwrite)?;
         resolver.move_to(path);

@@ -4,7 +4,7 @@
 
 use crate::Scene;
 use crate::light::Light;
-use crate::material::{Fresnel, Highlight, Material};
+use crate::material::{Fresnel, Highlight, METAL_REMEDY, Material};
 use crate::validate::Problem;
 use crate::value::{Color, number};
 use std::collections::HashSet;
@@ -16,8 +16,9 @@ type Case = (Vec<String>, String);
 type MaterialLint = fn(&Material) -> Option<(&'static str, String)>;
 
 /// Lints of materials, each with the help text of its warning.
-const MATERIAL_LINTS: [(MaterialLint, &str); 3] = [
+const MATERIAL_LINTS: [(MaterialLint, &str); 4] = [
     (brighter_than_its_light, "Allowed: the picture is clipped only for display."),
+    (|m| without_effect("metal", m.metal.is_some() && !m.shows_f0()), METAL_REMEDY),
     (
         |m| without_effect("alpha", m.alpha.is_some() && !m.has_microfacets()),
         "It belongs to lobe \"beckmann\" or \"ggx\", or to highlight \"cook-torrance\".",
@@ -127,7 +128,7 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
         Highlight::Phong => m.specular + m.reflection,
         Highlight::CookTorrance => m.specular.max(m.reflection),
     };
-    let f0 = m.metal.map(|metal| metal.f0()).or(m.f0).unwrap_or(Color::WHITE).largest();
+    let f0 = m.f0().largest();
     let passed = match m.fresnel_mode() {
         // A dielectric reflects the share F and transmits 1 - F: the larger weight bounds the sum.
         Fresnel::Dielectric => mirrored.max(m.transmission),

@@ -103,6 +103,8 @@ impl EffectRunner {
                 self.edit(|editing| editing.files.save(scene, path, overwrite));
             }
             Effect::Load => self.edit(|editing| editing.files.give(Job::Load)),
+            Effect::Open(source) => self.edit(|editing| editing.files.give(Job::Open(source))),
+            Effect::ListScenes => self.edit(|editing| editing.files.give(Job::List)),
             Effect::Autosave(scene) => self.edit(|editing| editing.files.autosave(scene)),
             Effect::Recover => {
                 self.edit(|editing| editing.files.give_autosave(AutosaveJob::Recover));

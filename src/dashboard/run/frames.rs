@@ -1,6 +1,7 @@
 //! Frame pipeline: draws the model, and sends the differences from the contents of the terminal.
 
 use crate::dashboard::run::exports::image_upload::ImageUpload;
+use crate::dashboard::run::exports::paths;
 use crate::dashboard::run::writer::{self, Writer};
 use crate::dashboard::view::{View, is_settled};
 use crate::dashboard::{Model, Overlay};
@@ -11,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use zerkalo_terminal::diff::{FrameDiff, TargetFrame};
 use zerkalo_terminal::flow::{FlowControl, FrameBudget, InitialLink, TcpSendQueue};
-use zerkalo_terminal::{Capabilities, Tty, copied};
+use zerkalo_terminal::{Capabilities, Multiplexer, Tty, copied, hyperlink};
 
 /// Start and end of a synchronised update, which the terminal displays as a whole.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
@@ -37,6 +38,8 @@ pub struct FramePipeline {
     cursor: Option<Position>,
     /// Escape sequence that sets the clipboard, to be sent with the next frame.
     clipboard: String,
+    /// Escape sequence of the link to an exported file, and the last one that was sent.
+    link: [Option<String>; 2],
     tty: Arc<Tty>,
     /// Upload of the viewed image.
     pub upload: Option<ImageUpload>,
@@ -87,6 +90,7 @@ impl FramePipeline {
             target: Buffer::empty(Rect::ZERO),
             cursor: None,
             clipboard: String::new(),
+            link: [None, None],
             tty,
             upload: None,
             removal: Vec::new(),
@@ -243,6 +247,10 @@ impl FramePipeline {
         }
         self.removing |= !std::mem::take(&mut self.removal).is_empty();
         bytes.extend(std::mem::take(&mut self.clipboard).as_bytes());
+        if self.link[0] != self.link[1] {
+            bytes.extend(self.link[0].as_deref().unwrap_or_default().as_bytes());
+            self.link[1] = self.link[0].clone();
+        }
         bytes.extend(self.flow.ack_request().unwrap_or_default().as_bytes());
         self.flow.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.send(bytes, now);
@@ -261,5 +269,25 @@ impl FramePipeline {
         self.target.resize(Rect { x: 0, y: 0, width, height });
         self.target.reset();
         self.cursor = self.view.draw(model, &mut self.target);
+        self.link[0] = self.link_to_export(model);
+    }
+
+    /// Returns the sequence that makes the path in the notice of an export a link; `None` without
+    /// such a notice. It restores the cursor and the colours.
+    fn link_to_export(&self, model: &Model) -> Option<String> {
+        let environment = &self.terminal.environment;
+        let is_able =
+            environment.term != "linux" && environment.multiplexer != Some(Multiplexer::Screen);
+        let path = model.last_export.as_ref().filter(|_| is_able)?;
+        let text = path.display().to_string();
+        model.notice.as_ref().filter(|notice| notice.text.starts_with(&text))?;
+        // The notice begins with a space, a mark and a space.
+        let (x, y) = (3, model.layout()?.hints.y);
+        let mut cells = text.chars().zip(x..);
+        let is_shown = cells.all(|(c, x)| {
+            self.target.cell((x, y)).is_some_and(|cell| cell.symbol().chars().eq([c]))
+        });
+        let link = is_shown.then(|| hyperlink(&paths::url(path), &text))?;
+        Some(format!("\x1b7\x1b[{};{}H\x1b[0;4m{link}\x1b8", y + 1, x + 1))
     }
 }

@@ -12,6 +12,7 @@ mod latency;
 mod worker;
 mod writer;
 
+use crate::dashboard::scene_source::is_new;
 use crate::dashboard::{Exported, Message, Model};
 use crossbeam_channel::{Receiver, unbounded};
 use effects::EffectRunner;
@@ -96,7 +97,9 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
             None => effects.session.set_scene(Arc::clone(scene)),
         };
     }
-    let model = Model::new(path, &name, scene, DEFAULT_STOP);
+    let is_new = path.as_deref().is_some_and(is_new);
+    let mut model = Model::new(path, &name, scene, DEFAULT_STOP);
+    model.file.is_new = is_new;
     run_on_terminal(effects, done, model, terminal, trace)
 }
 

@@ -2,7 +2,9 @@
 
 use crate::dashboard::key_context::KeyContext::{self, *};
 use crate::dashboard::update::{BACK, DOWN, FORWARD, LEFT, RIGHT, UP};
-use crate::dashboard::{DisplayChannel, Effect, Format, Mode, Model, Overlay, UpdateContext};
+use crate::dashboard::{
+    DisplayChannel, Effect, Format, Mode, Model, Overlay, SceneSource, UpdateContext,
+};
 use HintLine as H;
 use zerkalo_terminal::event::Key;
 
@@ -168,6 +170,8 @@ pub static COMMANDS: &[Command] = &[
     command("objects", "rotate right, fine", &[(Rotating, "Shift-Right")], |c| c.rotate_selection(1.0)),
     command("objects", "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
     command("objects", "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
+    command("objects", "make the selection gold, glass, …", &[(Anywhere, "S")], |c| c.pick_preset()).hints(&[hint(&[H::In(Outline)], 8, "S", "gold, glass …")]),
+    command("objects", "remove unused materials", &[], |c| c.purge_materials()),
 
     command("panels", "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).available(viewing).hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
     command("panels", "previous panel or field", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).available(viewing),
@@ -207,6 +211,8 @@ pub static COMMANDS: &[Command] = &[
     command("file", "redo", &[(Anywhere, "U Ctrl-r")], |c| c.redo()),
     command("file", "save", &[(Anywhere, "Ctrl-s")], |c| c.save()),
     command("file", "save as", &[(Anywhere, "W")], |c| c.ask_path()),
+    command("file", "new scene", &[(Anywhere, "Ctrl-n")], |c| c.open_scene(SceneSource::New)).available(not_watching),
+    command("file", "open another scene", &[(Anywhere, "O")], |c| c.emit(Effect::ListScenes)).available(not_watching),
     command("file", "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(not_watching),
     command("file", "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(not_watching),
     command("file", "write a checkpoint to continue later", &[(Anywhere, "K")], |c| c.checkpoint()),
@@ -222,6 +228,7 @@ pub static COMMANDS: &[Command] = &[
     command("picture", "exposure up", &[(Anywhere, "= +")], |c| c.exposure(1.0)).available(viewing),
     command("picture", "exposure down", &[(Anywhere, "-")], |c| c.exposure(-1.0)).available(viewing),
     command("picture", "exposure 0", &[(Anywhere, "0")], |c| c.set_exposure(0.0)).available(viewing),
+    command("picture", "exposure from the picture", &[(Anywhere, "E")], |c| c.expose()).available(viewing),
     command("picture", "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()).available(viewing),
     command("picture", "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).available(viewing).hints(&[hint(&[H::In(Probing), H::Watching], 3, "v", "views")]),
     command("picture", "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)).available(viewing),

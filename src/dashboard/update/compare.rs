@@ -4,9 +4,12 @@ use crate::dashboard::update::{Direction, cycled};
 use crate::dashboard::{DisplayChannel, Effect, Mode, UpdateContext};
 use std::sync::Arc;
 use zerkalo_render::film::{LinearImage, Tone};
+use zerkalo_terminal::cells::linear;
 
 /// Change of the exposure per step, in stops.
 const EXPOSURE_STEP: f64 = 0.25;
+/// Level of the median pixel after [`UpdateContext::expose`].
+const MIDDLE_LEVEL: u8 = 90;
 /// Largest exposure in stops. Beyond it every picture is white or black.
 const MOST_EXPOSURE: f64 = 20.0;
 
@@ -20,6 +23,29 @@ impl UpdateContext<'_> {
         self.model.display.exposure_ev = ev;
         self.set_display();
         self.say(format!("exposure {ev:+.2} stops"));
+    }
+
+    /// Sets the exposure that gives half of the picture's pixels more than [`MIDDLE_LEVEL`].
+    pub(super) fn expose(&mut self) {
+        let picture = self.model.snapshot.as_ref().and_then(|snapshot| {
+            let newest = snapshot.weights_for(self.scene());
+            let picture = snapshot.picture.as_ref()?;
+            Some(picture.mixed(newest.as_ref().unwrap_or(&snapshot.weights)))
+        });
+        let luminance =
+            |[red, green, blue]: &[f32; 3]| 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+        let mut luminances: Vec<f32> = picture.iter().flatten().map(luminance).collect();
+        luminances.sort_unstable_by(f32::total_cmp);
+        match luminances.get(luminances.len() / 2) {
+            Some(median) if *median > 1e-6 => {
+                let middle = linear([MIDDLE_LEVEL; 3])[0];
+                let steps = f64::from(middle / median).log2() / EXPOSURE_STEP;
+                self.set_exposure(
+                    (steps.round() * EXPOSURE_STEP).clamp(-MOST_EXPOSURE, MOST_EXPOSURE),
+                );
+            }
+            _ => self.say("Half of the picture is black · A adds a light"),
+        }
     }
 
     pub(super) fn next_tone(&mut self) {

@@ -1,7 +1,9 @@
 //! Undo, saving, reloading and quitting, and the results of saves, loads and exports.
 
 use crate::dashboard::model::{Tone, file_notice, first_line};
-use crate::dashboard::{Answer, Effect, Exported, UpdateContext, short_name};
+use crate::dashboard::{
+    Answer, Effect, Exported, OpenedScene, PickEntry, SceneSource, UpdateContext, short_name,
+};
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_scene::edit::{Target, outline};
@@ -65,13 +67,19 @@ impl UpdateContext<'_> {
                 self.model.file.path = Some(path);
                 self.model.file.saved = Arc::clone(&scene);
                 self.model.file.broken = None;
+                self.model.file.is_new = false;
                 self.model.history.mark_saved(scene);
                 self.model.last_edit = None;
                 self.notify(Tone::Good, format!("saved {}", self.model.file.name), Some(3.0));
                 // The scene may have been edited while it was being saved.
-                if std::mem::take(&mut self.model.quit_when_saved) && !self.model.is_unsaved() {
+                let is_unsaved = self.model.is_unsaved();
+                if std::mem::take(&mut self.model.quit_when_saved) && !is_unsaved {
                     self.emit(Effect::Quit);
                 }
+                let next = self.model.next_scene.take();
+                next.into_iter()
+                    .filter(|_| !is_unsaved)
+                    .for_each(|next| self.emit(Effect::Open(next)));
             }
             Err(SaveError::Untitled) => self.ask_path(),
             Err(error @ SaveError::Changed(_)) => {
@@ -88,7 +96,7 @@ impl UpdateContext<'_> {
                 self.ask(text, &[SAVE_AS, overwrite]);
             }
             Err(error @ SaveError::Failed { .. }) => {
-                self.model.quit_when_saved = false;
+                self.decline();
                 self.notify(Tone::Bad, capital(&error.to_string()), None);
             }
         }
@@ -102,7 +110,68 @@ impl UpdateContext<'_> {
         }
     }
 
+    /// Opens the built-in scene called `name`, or the scene file at this path. If there is no such
+    /// file, the new scene gets it.
+    pub(super) fn open_scene_file(&mut self, name: &str) {
+        self.open_scene(SceneSource::of(name));
+    }
+
+    /// Opens a scene. If there are unsaved edits, asks first.
+    pub(super) fn open_scene(&mut self, next: SceneSource) {
+        if !self.model.is_unsaved() || self.model.file.unreadable {
+            return self.emit(Effect::Open(next));
+        }
+        self.model.next_scene = Some(next);
+        let text = format!("{} has unsaved edits.", self.model.file.name);
+        let discard: Answer = ('d', "discard them", |c| {
+            let next = c.model.next_scene.take();
+            next.into_iter().for_each(|next| c.emit(Effect::Open(next)));
+        });
+        self.ask(text, &[('s', "save them first", |c| c.save()), discard, STAY]);
+    }
+
+    pub(super) fn pick_scene(&mut self, scenes: Vec<(String, &'static str)>) {
+        if self.model.is_busy() {
+            return;
+        }
+        let entry = |(name, note): (String, &str)| PickEntry {
+            name,
+            note: note.to_string(),
+            keys: String::new(),
+        };
+        let entries: Vec<_> = scenes.into_iter().map(entry).collect();
+        self.open_pick("open a scene", entries, 0, |c, name| c.open_scene_file(name));
+    }
+
+    pub(super) fn opened(&mut self, result: Result<OpenedScene, SceneErrors>) {
+        let OpenedScene { scene, path, name, is_new } = match result {
+            Ok(opened) => opened,
+            Err(errors) => return self.notify(Tone::Bad, first_line(&errors), None),
+        };
+        let file = &mut self.model.file;
+        (file.name, file.path, file.is_new) = (name, path, is_new);
+        self.model.pinned = None;
+        self.model.export_when_done = None;
+        self.model.orphaned_edits = None;
+        self.model.selection = Target::Camera;
+        let verb = if is_new { "new scene" } else { "opened" };
+        self.loaded(Ok(scene));
+        if file_notice(self.scene()).is_none() {
+            self.say(format!("{verb} {}", self.model.file.name));
+        }
+    }
+
+    /// Shows the first error that another program has written to the scene file.
+    pub(super) fn broken_on_disk(&mut self, errors: SceneErrors) {
+        let text = first_line(&errors);
+        self.model.file.broken = Some(errors);
+        self.notify(Tone::Bad, format!("{text} The scene here stays as it is."), None);
+    }
+
     pub(super) fn changed_on_disk(&mut self) {
+        if !self.model.file.unreadable {
+            self.model.file.broken = None;
+        }
         let name = &self.model.file.name;
         if self.model.is_busy() {
             let text = format!("{name} has changed on disk · Ctrl-o reads it");
@@ -133,6 +202,7 @@ impl UpdateContext<'_> {
     /// Answers a question by changing nothing.
     pub(super) fn decline(&mut self) {
         self.model.quit_when_saved = false;
+        self.model.next_scene = None;
     }
 
     pub(super) fn loaded(&mut self, result: Result<Arc<Scene>, SceneErrors>) {

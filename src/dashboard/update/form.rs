@@ -7,14 +7,22 @@ use zerkalo_scene::edit::{self, Edit, EditError};
 
 impl UpdateContext<'_> {
     pub(super) fn pick_object(&mut self) {
-        self.open_pick("add an object", edit::object_kinds(), 0, |c, kind| {
-            c.open_form(kind, edit::add_object(c.scene(), kind, None));
+        let entries = [edit::object_kinds(), edit::ready_objects()].concat();
+        self.open_pick("add an object", entries, 0, |c, name| {
+            match edit::object_kinds().iter().any(|kind| kind.name == name) {
+                true => c.open_form(name, edit::add_object(c.scene(), name, None)),
+                false => c.add_ready_made(edit::add_ready_object(c.scene(), name)),
+            }
         });
     }
 
     pub(super) fn pick_light(&mut self) {
-        self.open_pick("add a light", edit::light_kinds(), 0, |c, kind| {
-            c.open_form(&format!("{kind} light"), edit::add_light(c.scene(), kind));
+        let entries = [edit::light_kinds(), edit::ready_lights()].concat();
+        self.open_pick("add a light", entries, 0, |c, name| {
+            match edit::light_kinds().iter().any(|kind| kind.name == name) {
+                true => c.open_form(&format!("{name} light"), edit::add_light(c.scene(), name)),
+                false => c.add_ready_made(edit::add_ready_light(c.scene(), name)),
+            }
         });
     }
 

@@ -91,7 +91,7 @@ impl UpdateContext<'_> {
                 self.show();
             }
             _ => {
-                self.model.quit_when_saved = false;
+                self.decline();
                 self.model.overlay = None;
             }
         }
@@ -135,15 +135,18 @@ impl UpdateContext<'_> {
         let pattern = Pattern::parse(text, CaseMatching::Ignore, Normalization::Smart);
         let mut matcher = Matcher::new(Config::DEFAULT);
         let mut buffer = Vec::new();
-        let mut score_of = |entry: &PickEntry| {
-            let line = format!("{} {}", entry.name, entry.note);
-            pattern.score(Utf32Str::new(&line, &mut buffer), &mut matcher)
-        };
+        let mut score_of =
+            |line: &str| pattern.score(Utf32Str::new(line, &mut buffer), &mut matcher);
         let scored = pick.entries.iter().enumerate();
-        let scored = scored.filter_map(|(i, entry)| Some((Reverse(score_of(entry)?), i)));
+        let scored = scored.filter_map(|(i, entry)| {
+            let line = format!("{} {}", entry.name, entry.note);
+            // A match in the name comes before a match in the note alone.
+            let is_in_note = score_of(&entry.name).is_none();
+            Some((is_in_note, Reverse(score_of(&line)?), i))
+        });
         let mut scored: Vec<_> = scored.collect();
         scored.sort_unstable();
-        pick.found = scored.into_iter().map(|(_, i)| i).collect();
+        pick.found = scored.into_iter().map(|(_, _, i)| i).collect();
         pick.at = ListCursor::default();
     }
 

@@ -107,18 +107,26 @@ impl UpdateContext<'_> {
                 self.model.convergence.add(&snapshot.report);
                 self.model.snapshot = Some(snapshot);
                 self.repaint();
+                self.export_if_done();
             }
             Message::Watched(report) => self.watched(*report),
             Message::Pinned(picture, spp) => self.pinned(picture, spp),
             Message::Saved(scene, result) => self.saved(scene, result),
             Message::Loaded(result) => self.loaded(*result),
             Message::ChangedOnDisk => self.changed_on_disk(),
+            Message::BrokenOnDisk(errors) => self.broken_on_disk(errors),
+            Message::MendedOnDisk => self.model.file.broken = None,
+            Message::Opened(result) => self.opened(*result),
+            Message::Scenes(scenes) => self.pick_scene(scenes),
             Message::AssetsChanged => self.assets_changed(),
             Message::OrphanedEdits(edits) => self.orphaned_edits(edits),
             Message::Warning(text) => self.notify(Tone::Bad, capital(&text), None),
             Message::Exported(result) => self.exported(result),
             Message::ExportProgress(progress) => match (&mut self.model.export, progress) {
-                (Some(export), Some(progress)) => export.progress = progress,
+                (Some(export), Some((progress, left))) => {
+                    export.progress = progress.max(export.progress);
+                    export.left = left;
+                }
                 (export, _) => *export = None,
             },
             Message::ViewerImage(path, result) => self.image_ready(&path, result),

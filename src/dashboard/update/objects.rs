@@ -3,7 +3,7 @@
 use crate::dashboard::UpdateContext;
 use crate::dashboard::update::{Coalesce, Direction};
 use glam::{DVec2, DVec3};
-use zerkalo_scene::edit::{self, bounds, step_length};
+use zerkalo_scene::edit::{self, Edit, EditError, bounds, step_length};
 
 /// Largest factor by which a drag in the ground plane is stretched in depth. The stretch
 /// compensates foreshortening: it is 1 / sin of the angle between view direction and ground, which
@@ -95,6 +95,31 @@ impl UpdateContext<'_> {
         if self.commit_and_select(edit) && !noted {
             self.say(format!("{label} deleted · u undoes"));
         }
+    }
+
+    /// Adds what `edit` has added, without a form.
+    pub(super) fn add_ready_made(&mut self, edit: Result<Edit, EditError>) {
+        if self.commit_and_select(edit) {
+            let label = self.model.selection.label(self.scene());
+            self.say(format!("{label} added · m moves it · Enter inspects it · u undoes"));
+        }
+    }
+
+    /// Opens the list of presets for the selection's material.
+    pub(super) fn pick_preset(&mut self) {
+        let label = self.model.selection.label(self.scene());
+        self.open_pick(format!("make {label} of"), edit::presets(), 0, |c, name| {
+            let edit = edit::give_preset(c.scene(), &c.model.selection, name);
+            if c.commit(edit, Coalesce::Single) {
+                let label = c.model.selection.label(c.scene());
+                c.say(format!("{label} is {name} · u undoes"));
+            }
+        });
+    }
+
+    pub(super) fn purge_materials(&mut self) {
+        let edit = edit::purge_materials(self.scene());
+        self.commit(edit, Coalesce::Single);
     }
 
     pub(super) fn own_material(&mut self) {

@@ -136,7 +136,7 @@ impl UpdateContext<'_> {
         let film = edit::set(self.scene(), &Target::Settings(SceneSettings::Film), "size", size);
         let scene = film.map_err(|error| error.to_string())?.scene;
         let size = scene.film.size;
-        self.model.export = Some(RunningExport { size, progress: 0.0 });
+        self.model.export = Some(RunningExport { size, progress: 0.0, left: None });
         let (display, stop) = (self.model.display, self.model.stop);
         self.emit(Effect::ExportSized { scene: Arc::new(scene), format, display, stop });
         self.say(format!("rendering {}x{} beside this picture · Ctrl-x cancels", size[0], size[1]));

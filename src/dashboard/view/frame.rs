@@ -28,7 +28,7 @@ pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &m
     let name = name.add_modifier(Modifier::BOLD);
     let unsaved = if model.is_unsaved() { 2 } else { 0 };
     let room = row.left().saturating_sub(2 + unsaved);
-    row.put(" ", name).put(&cut(&model.file.name, room), name);
+    row.put(" ", name).put(&cut(&title(model), room), name);
     if unsaved > 0 {
         row.put(" ●", theme.warn());
     }
@@ -38,6 +38,17 @@ pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &m
     }
     if let Some(legend) = legend {
         legend.draw(painter.edge(area, bottom));
+    }
+}
+
+/// Returns the name of the scene's file, or that of a scene without a file.
+fn title(model: &Model) -> String {
+    let file = &model.file;
+    match &file.path {
+        _ if model.watch.is_some() => file.name.clone(),
+        Some(_) if file.is_new => format!("{} (new)", file.name),
+        Some(_) => file.name.clone(),
+        None => format!("{} (no file)", file.name.trim_end_matches(".toml")),
     }
 }
 

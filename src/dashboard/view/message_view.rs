@@ -50,6 +50,15 @@ fn formatted(message: &Diagnostic, theme: &Theme) -> Vec<(String, Style)> {
     texts
 }
 
+/// Draws what to do first in a scene without objects.
+pub fn empty(model: &Model, layout: &Layout, painter: &mut Painter) {
+    if model.is_empty() && model.overlay.is_none() {
+        let hints = ["a  adds an object: gold ball, checker floor, mirror …", "A  adds a light"];
+        let texts = hints.map(|hint| (hint.to_string(), painter.theme.text()));
+        painter.paragraphs(text_area(layout), &texts);
+    }
+}
+
 /// Draws the reason why the scene cannot be rendered, and on the border the first error of a scene
 /// file that has become unreadable.
 pub fn failure(model: &Model, layout: &Layout, painter: &mut Painter) {

@@ -3,6 +3,7 @@
 mod false_color;
 mod fields;
 mod frame;
+mod ground_grid;
 mod image_viewer;
 mod legend;
 mod message_view;
@@ -50,7 +51,11 @@ impl View {
         let version = (model.picture_version, layout.raster, model.colors);
         if self.made_for != Some(version) {
             let settled = picture::is_settled(model);
-            let raster = self.imager.raster(model, layout.raster).unwrap_or_default();
+            let raster = match model.is_empty() {
+                true => Some(ground_grid::raster(model.scene(), layout.raster)),
+                false => self.imager.raster(model, layout.raster),
+            };
+            let raster = raster.unwrap_or_default();
             self.picture = picture_cells(&raster, model.colors, settled);
             self.made_for = Some(version);
         }
@@ -80,6 +85,7 @@ impl View {
         } else {
             picture::paint(&self.picture, layout.image, painter.buffer);
             message_view::failure(model, &layout, painter);
+            message_view::empty(model, &layout, painter);
             pixel_probe::draw(model, &layout, painter);
         }
         status::draw(model, layout.status, painter);

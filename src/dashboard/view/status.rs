@@ -50,7 +50,8 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     let mut parts = Vec::new();
     if let Some(export) = &model.export {
         let [width, height] = export.size;
-        let text = format!("writing {width}×{height}  {:.0} %", 100.0 * export.progress);
+        let left = export.left.map_or(String::new(), |left| format!("  {} left", durations(left)));
+        let text = format!("writing {width}×{height}  {:.0} %{left}", 100.0 * export.progress);
         parts.push(part(0, vec![(text, theme.accent())]));
     }
     let watching = model.watch.is_some();
@@ -65,7 +66,15 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     };
     let report = &snapshot.report;
     if !watching {
-        parts.insert(0, part(0, vec![state(model, report, theme)]));
+        // A picture without objects is complete, but there is nothing to see; and while an export
+        // renders, its progress is what matters.
+        if model.is_empty() {
+            parts.insert(0, part(0, vec![dim("empty")]));
+            return parts;
+        }
+        if model.export.is_none() {
+            parts.insert(0, part(0, vec![state(model, report, theme)]));
+        }
         if matches!(report.state, State::Idle | State::Failed(_)) {
             return parts;
         }

@@ -2,23 +2,20 @@
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
-use crate::edit::bounds::scene_bounds;
+use crate::edit::bounds::pivot_distance;
 use crate::edit::convert::irradiance_at;
-use crate::edit::placement::place_for;
+use crate::edit::placement::{ground_height, place_for};
 use crate::edit::properties::{Word, words};
 use crate::edit::unique_name::{free_light, free_material, free_object};
 use crate::edit::{Edit, EditError, Target};
 use crate::light::{Falloff, Light, LightKind, Placement};
 use crate::material::Material;
 use crate::shape::{KINDS, Shape, compose};
-use crate::value::{
-    Color, names, number, round_nice, round_significant, rounded_to, sort_by_number, total_order,
-    unit,
-};
+use crate::value::{Color, names, number, round_nice, round_significant, rounded_to, unit};
 use crate::{Object, Scale, Scene, TransformOp};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo_kernel::primitive::{BoundingSphere, Form, ParallelogramForm};
+use zerkalo_kernel::primitive::{Form, ParallelogramForm};
 
 /// Returns the name and a description of each kind of object that can be added.
 pub fn object_kinds() -> Vec<Word> {
@@ -30,28 +27,32 @@ pub fn light_kinds() -> Vec<Word> {
     words(LightKind::FIELDS)
 }
 
-/// Linear colours of new materials. A new material gets the first colour that no other one has.
-const PALETTE: [[f64; 3]; 6] = [
-    [0.85, 0.16, 0.11],
-    [0.13, 0.28, 0.8],
-    [0.15, 0.62, 0.28],
-    [0.9, 0.68, 0.12],
-    [0.55, 0.2, 0.65],
-    [0.1, 0.6, 0.65],
+/// Names and linear colours of new materials. A new material gets the first colour that no other one
+/// has.
+const PALETTE: [(&str, [f64; 3]); 6] = [
+    ("red", [0.85, 0.16, 0.11]),
+    ("blue", [0.13, 0.28, 0.8]),
+    ("green", [0.15, 0.62, 0.28]),
+    ("yellow", [0.9, 0.68, 0.12]),
+    ("purple", [0.55, 0.2, 0.65]),
+    ("teal", [0.1, 0.6, 0.65]),
 ];
 
-/// Returns a material with the first free colour of the palette. If no colour is free, the colours
-/// are taken in turn.
-fn fresh_material(scene: &Scene) -> Material {
+/// Returns the first free colour of the palette. If no colour is free, the colours are taken in turn.
+pub(super) fn free_color(scene: &Scene) -> (&'static str, Color) {
     let used = |color: &[f64; 3]| scene.materials.values().any(|m| m.color.0 == *color);
-    let free = PALETTE.iter().find(|color| !used(color));
-    let color = free.copied().unwrap_or(PALETTE[scene.materials.len() % PALETTE.len()]);
-    let (diffuse, specular, exponent) = (0.8, 0.2, 40.0);
-    Material { color: Color(color), diffuse, specular, exponent, ..Material::default() }
+    let free = PALETTE.iter().find(|(_, color)| !used(color));
+    let (name, color) = free.unwrap_or(&PALETTE[scene.materials.len() % PALETTE.len()]);
+    (name, Color(*color))
 }
 
-/// Adds an object. It rests on a surface, as near as possible to the middle of the view, and is
-/// somewhat smaller than most other objects. A plane is put below all objects. Without `material`
+fn fresh_material(scene: &Scene) -> Material {
+    let (diffuse, specular, exponent) = (0.8, 0.2, 40.0);
+    Material { color: free_color(scene).1, diffuse, specular, exponent, ..Material::default() }
+}
+
+/// Adds an object. It rests on a surface, as near as possible to the middle of the view, and has an
+/// eighth of the view's width. A plane is put at height 0. Without `material`
 /// the object gets a new material. Fails if there is no such kind or material.
 pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<Edit, EditError> {
     let size = usual_size(scene);
@@ -63,12 +64,13 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     };
     face_camera(&mut shape, scene);
     if let Form::Plane(_) = shape.form() {
-        // A plane is put below all objects, so that it does not coincide with an existing ground.
+        // A plane at height 0 would coincide with a ground there: it is put below all objects.
         let lows = scene.objects.iter().filter_map(|o| Some(o.form().bounds()?.0.y));
-        if let Some(lowest) = lows.reduce(f64::min) {
-            let under = round_nice(lowest - 0.1 * size, size);
-            shape.anchor_points_mut().into_iter().for_each(|anchor| anchor[1] = under);
-        }
+        let is_taken = ground_height(scene, base.with_y(size), size) == 0.0
+            && scene.objects.iter().any(|object| !object.form().is_solid());
+        let lowest = lows.reduce(f64::min).unwrap_or(0.0);
+        let height = if is_taken { round_nice(lowest - 0.1 * size, size) } else { 0.0 };
+        shape.anchor_points_mut().into_iter().for_each(|anchor| anchor[1] = height);
     }
     let mut next = scene.clone();
     let name = free_object(scene, kind);
@@ -104,24 +106,35 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     steps
 }
 
-/// Returns the length of a new object, rounded to one digit. It is 0.6 times the median length of
-/// the solids, after that median is limited to the range from 0.01 R to R. R is the radius of
-/// [`scene_bounds`]. It is 0.15 R without solids, and 0.6 in an empty scene.
-fn usual_size(scene: &Scene) -> f64 {
-    let radius = scene_bounds(scene).radius;
-    let solid = |object: &Object| {
-        let form = object.form();
-        let (low, high) = form.bounds()?;
-        form.is_solid().then(|| (high - low).max_element())
+/// Fits the mesh that `edit` reads for an object of `old` without a file into the placeholder's box.
+pub(super) fn fit_mesh(old: &Scene, edit: Edit) -> Result<Edit, EditError> {
+    let Target::Object(i) = edit.target else { return Ok(edit) };
+    let (before, mut next) = (&old.objects[i], edit.scene.clone());
+    let object = &mut next.objects[i];
+    let triangles = object.shape.mesh().map(|mesh| mesh.mesh.triangles.len());
+    let (None, Some(triangles), Some((low, high)), Some((from, to))) =
+        (before.shape.file(), triangles, before.form().bounds(), object.shape.form().bounds())
+    else {
+        return Ok(edit);
     };
-    let mut sizes: Vec<f64> = scene.objects.iter().filter_map(solid).collect();
-    sort_by_number(&mut sizes, |size| total_order(*size));
-    let size = match sizes.get(sizes.len() / 2) {
-        Some(middle) => middle.clamp(0.01 * radius, radius),
-        None if scene.objects.is_empty() => 1.0,
-        None => 0.25 * radius,
-    };
-    round_significant(0.6 * size, 1)
+    let size = round_significant((high - low).max_element(), 2);
+    let middle = (low + high) / 2.0;
+    object.transform = upright_steps(&object.shape, middle.with_y(low.y), size);
+    let [x, y, z] = (to - from).to_array().map(|x| number(round_significant(x, 3)));
+    let size = number(size);
+    let note = format!("{triangles} triangles, {x} x {y} x {z} units, scaled to {size}.");
+    Ok(Edit::checked(next, edit.target, edit.label)?.with_note(Some(note)))
+}
+
+/// Returns width and height of what the camera sees at the distance of its target.
+pub(super) fn view_size(scene: &Scene) -> [f64; 2] {
+    let half_size = scene.camera.half_size(scene.film.size.map(f64::from));
+    half_size.map(|half| 2.0 * half * pivot_distance(scene))
+}
+
+/// Returns the length of a new object: an eighth of the view's width, rounded to one digit.
+pub(super) fn usual_size(scene: &Scene) -> f64 {
+    round_significant(view_size(scene)[0] / 8.0, 1)
 }
 
 /// Rotates `shape` about the vertical by a multiple of 5 degrees, so that its front faces the
@@ -137,15 +150,26 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
     shape.rotate_y(rounded_to((heading(toward) - heading(front)) / 5.0, 0) * 5.0);
 }
 
-/// Adds a light of the kind `kind` above the scene, to the right or left of the camera: on the side
-/// with fewer lights. It illuminates the centre of the scene as a light of intensity 1 without
-/// falloff does, or half as brightly if another light is on.
+/// Adds a white light of the kind `kind`; see [`add_light_as`].
 ///
 /// # Errors
 /// Fails if there is no such kind.
 pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
-    let BoundingSphere { center, radius } = scene_bounds(scene);
+    add_light_as(scene, kind, ("", Color::WHITE, 1.0))
+}
+
+/// Adds a light of the kind `kind` above what the camera looks at, to the left or right of the camera:
+/// on the side with fewer lights. It exposes the picture by its distance and colour; half as much if
+/// another light is on. The last argument has its name, or an empty name for that of its kind, its
+/// colour, and its size in units of the usual one.
+pub(super) fn add_light_as(
+    scene: &Scene,
+    kind: &str,
+    (name, color, relative_size): (&str, Color, f64),
+) -> Result<Edit, EditError> {
     let [right, _, forward] = scene.camera.frame();
+    let center = DVec3::from_array(scene.camera.eye) + forward * pivot_distance(scene);
+    let radius = view_size(scene)[0] / 4.0;
     let level = |v: DVec3| DVec3::new(v.x, 0.0, v.z).try_normalize().unwrap_or(DVec3::X);
     let (right, forward) = (level(right), level(forward));
     let side = |light: &Light| match (light.position(), light.direction()) {
@@ -154,20 +178,21 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
         (None, None) => 0.0,
     };
     let lit: f64 = scene.lights.iter().map(|l| side(l).signum()).sum();
-    let toward = if lit > 0.0 { -right } else { right };
+    let toward = if lit < 0.0 { right } else { -right };
     let from = toward * 0.8 - forward * 0.8 + DVec3::Y * 1.4;
     let position = (center + from * (1.5 * radius)).map(|x| round_nice(x, radius)).to_array();
     let direction = (-from).normalize().map(|x| rounded_to(x, -2)).to_array();
-    let placement = Placement { position, direction, radius: radius / 5.0 };
+    let placement = Placement { position, direction, radius: relative_size * radius / 5.0 };
     let Some(placed) = LightKind::placed(kind, &placement) else {
         let found = format!("there is no kind of light called \"{kind}\"");
         let kinds = names(LightKind::FIELDS);
         return Err(EditError::new(&found, &format!("Expected one of {kinds}.")));
     };
-    let mut light = Light::new(placed);
-    light.name = free_light(scene, light.kind.usual_name());
-    // If a light is on already, the new light adds to it, and therefore gets half the intensity.
-    light.intensity = if scene.lights.iter().any(|l| l.on) { 0.5 } else { 1.0 };
+    let mut light = Light { color, ..Light::new(placed) };
+    let name = if name.is_empty() { light.kind.usual_name() } else { name };
+    light.name = free_light(scene, name);
+    let is_lit = scene.lights.iter().any(|l| l.on);
+    light.intensity = EXPOSURE * if is_lit { 0.5 } else { 1.0 } / luminance(color);
     let physical = scene.lights.iter().all(|l| l.falloff == Falloff::InverseSquare);
     if physical && !scene.lights.is_empty() && light.apex().is_some() {
         // All other lights have the inverse square falloff: the new one gets it, too.
@@ -185,6 +210,15 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let target = Target::Light(next.lights.len() - 1);
     Ok(Edit::checked(next, target, label)?.with_note(note))
 }
+
+/// Returns the luminance of a linear colour (Rec. 709).
+fn luminance(Color([red, green, blue]): Color) -> f64 {
+    0.2126 * red + 0.7152 * green + 0.0722 * blue
+}
+
+/// Brightness of a white diffuse surface that faces the first light. Surfaces of usual albedos at
+/// usual angles then have about the level 90 of 255.
+const EXPOSURE: f64 = 1.0;
 
 #[cfg(test)]
 mod tests {
@@ -252,6 +286,22 @@ mod tests {
         }
         assert!(add_object(&Scene::default(), "sphere", Some("none")).is_err());
         assert!(add_object(&Scene::default(), "blob", None).is_err());
+    }
+
+    #[test]
+    fn mesh_of_a_file_gets_the_size_of_a_new_object() {
+        let folder = tempfile::tempdir().unwrap();
+        let obj = "v 0 0 0\nv 180 0 0\nv 0 90 0\nv 0 0 60\nf 1 2 3\nf 1 2 4\n";
+        std::fs::write(folder.path().join("large.obj"), obj).unwrap();
+        let path = folder.path().join("a.toml");
+        std::fs::write(&path, "film.size = [64, 48]\n").unwrap();
+        let added = add_object(&Scene::read(&path).unwrap(), "mesh", None).unwrap();
+        let key = "shape.mesh.file";
+        let edit = crate::edit::set(&added.scene, &added.target, key, "large.obj").unwrap();
+        let note = "2 triangles, 180 x 90 x 60 units, scaled to 0.6.";
+        assert_eq!(edit.note.as_deref(), Some(note));
+        let (low, high) = edit.scene.objects[0].form().bounds().unwrap();
+        assert!(low.y.abs() < 1e-9 && ((high - low).x - 0.6).abs() < 1e-6, "{low} {high}");
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod parse_value;
 mod part;
 mod placement;
 mod properties;
+mod ready_made;
 mod rotate;
 mod set;
 mod target;
@@ -29,6 +30,10 @@ pub use lens::{change_aperture, focus_on};
 pub use mirror_material::{mirror, step_mirror};
 pub use placement::snap_to_ground;
 pub use properties::{Property, Widget, Word, rows};
+pub use ready_made::{
+    add_ready_light, add_ready_object, give_preset, presets, purge_materials, ready_lights,
+    ready_objects,
+};
 pub use rotate::rotate;
 pub use set::{set, set_component};
 pub use target::{SceneSettings, Section, Target, outline};

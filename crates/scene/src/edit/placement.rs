@@ -3,6 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
 use crate::camera::Camera;
+use crate::edit::add::view_size;
 use crate::edit::bounds::{Extent, scene_bounds};
 use crate::edit::{Edit, EditError, Target};
 use crate::value::{floor_log10, round_significant, rounded_to};
@@ -99,22 +100,31 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let grid = floor_log10(size.min_element()) - 2;
     let candidate = |offset: DVec2| {
         let at = DVec3::new(aim.x + offset.x, aim.y, aim.z + offset.y);
-        let ground = ground_under(&floors, at).unwrap_or(aim.y - size.y / 2.0);
+        let ground = ground_under(&floors, at).unwrap_or_else(|| bare_ground(scene, aim, size.y));
         DVec3::new(rounded_to(at.x, grid), round_significant(ground, 13), rounded_to(at.z, grid))
     };
     let spread = size.x.max(size.z);
-    let spots = (0..400).map(|i| {
+    // Beside each other as the camera sees it.
+    let [right, ..] = scene.camera.frame();
+    let side = DVec2::new(right.x, right.z).try_normalize().unwrap_or(DVec2::X);
+    let row = [0.0, 1.0, -1.0, 2.0, -2.0].map(|i| side * (1.25 * i * spread));
+    let spiral = (0..400).map(|i| {
         // A sunflower spiral covers the area evenly from the middle outwards.
         let angle = f64::from(i) * 2.399_963_229_728_653;
         DVec2::from_angle(angle) * (0.45 * spread * f64::from(i).sqrt())
     });
     let reach = 6.0 * radius.max(spread);
-    let free = spots.take_while(|offset| offset.length() <= reach).map(candidate).filter(|base| {
-        let half = DVec3::new(spread / 2.0, 0.0, spread / 2.0);
-        let room = (*base - half, *base + half + DVec3::Y * size.y);
-        !walls.iter().any(|wall| intersects(wall, room))
-            && !solids.iter().any(|solid| overlap(*solid, room))
-    });
+    let free = row
+        .into_iter()
+        .chain(spiral)
+        .take_while(|offset| offset.length() <= reach)
+        .map(candidate)
+        .filter(|base| {
+            let half = DVec3::new(spread / 2.0, 0.0, spread / 2.0);
+            let room = (*base - half, *base + half + DVec3::Y * size.y);
+            !walls.iter().any(|wall| intersects(wall, room))
+                && !solids.iter().any(|solid| overlap(*solid, room))
+        });
     // A hidden position inside the picture is second best.
     let (mut hidden, mut outside) = (None, None);
     for base in free {
@@ -128,6 +138,20 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
         }
     }
     hidden.or(outside).unwrap_or_else(|| candidate(DVec2::ZERO))
+}
+
+/// Returns the height of the ground at `at` for an object of height `size`.
+pub(super) fn ground_height(scene: &Scene, at: DVec3, size: f64) -> f64 {
+    let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
+    let floors: Vec<&Form> = forms.iter().filter(|f| !f.is_solid() && is_level(f)).collect();
+    ground_under(&floors, at).unwrap_or_else(|| bare_ground(scene, at, size))
+}
+
+/// Returns the height on which objects stand without a floor: 0 if the camera sees it below its
+/// target `aim`, otherwise half of `size` below the target.
+fn bare_ground(scene: &Scene, aim: DVec3, size: f64) -> f64 {
+    let is_near = aim.y >= 0.0 && aim.y <= view_size(scene)[1] / 2.0;
+    if is_near { 0.0 } else { aim.y - size / 2.0 }
 }
 
 /// Returns `true` if an object is flat and its slope is less than 60 degrees.

@@ -6,7 +6,7 @@ use crate::edit::parse_value::{color, parse, show};
 use crate::edit::part::{exclusive_keys, fields, given_key, part};
 use crate::edit::{EditError, Target};
 use crate::value::{
-    DefaultValue, Field, KeyNode, KeyValue, NumberRange, ValueType, names, number, written,
+    DefaultValue, Field, KeyNode, KeyValue, NumberRange, ValueType, names, node_at, number, written,
 };
 
 /// Word that a property accepts as its value.
@@ -70,7 +70,7 @@ pub struct Property {
 /// object's material.
 pub fn rows(scene: &Scene, target: &Target) -> Result<Vec<Property>, EditError> {
     let part = part(scene, target)?;
-    let mut walk = PropertyWalker { scene, target, rows: Vec::new() };
+    let mut walk = PropertyWalker { scene, target, base: part.base(), rows: Vec::new() };
     let virtual_kind = match target {
         Target::Light(_) => Some(&KIND),
         Target::Camera | Target::View(_) => Some(&AIM),
@@ -106,6 +106,8 @@ pub fn rows(scene: &Scene, target: &Target) -> Result<Vec<Property>, EditError> 
 struct PropertyWalker<'a> {
     scene: &'a Scene,
     target: &'a Target,
+    /// Values of omitted keys by a preset.
+    base: Option<Box<dyn KeyNode>>,
     rows: Vec<Property>,
 }
 
@@ -174,11 +176,15 @@ impl PropertyWalker<'_> {
     fn leaf(&mut self, field: &'static Field, node: &dyn KeyNode, key: String, depth: usize) {
         let mut row = self.row(field, key, depth);
         let value = node.value();
+        let of_base = self.base.as_ref().and_then(|base| node_at(base.as_ref(), &row.key)?.value());
         row.is_default = match field.preset {
             DefaultValue::Required => false,
             DefaultValue::Without(_) => node.is_absent(),
-            DefaultValue::Is(text) => value == parse(field, text).ok(),
+            DefaultValue::Is(text) => value == of_base.clone().or(parse(field, text).ok()),
         };
+        if let Some(of_base) = of_base {
+            row.default = Some(show(field.takes, &of_base));
+        }
         if let Some(value) = value {
             row.value = show(field.takes, &value);
             row.color = color(field.takes, &value).map(|c| c.0);

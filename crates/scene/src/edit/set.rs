@@ -2,13 +2,17 @@
 
 use crate::Scene;
 use crate::TransformOp;
+use crate::edit::add::fit_mesh;
 use crate::edit::convert;
 use crate::edit::convert::{AIM, KIND};
 use crate::edit::parse_value::{parse, word};
 use crate::edit::part::{exclusive_keys, field, fields, part, part_mut};
 use crate::edit::properties::is_material;
 use crate::edit::{Edit, EditError, Target};
-use crate::value::{DefaultValue, Field, KeyNode, KeyValue, ValueType, node_at, node_at_mut};
+use crate::material::METAL_REMEDY;
+use crate::value::{
+    DefaultValue, Field, KeyNode, KeyValue, PRESET, ValueType, node_at, node_at_mut,
+};
 
 /// Sets `key` of `target` to the value in `text`. If the key is the transform of an object, `text`
 /// is a kind of step, and an identity step of this kind is appended. An empty `text` sets an
@@ -42,7 +46,8 @@ pub fn set(scene: &Scene, target: &Target, key: &str, text: &str) -> Result<Edit
     if let (Target::Light(i), "falloff") = (target, key) {
         return convert::switch_falloff(scene, *i, value);
     }
-    replace(scene, target, key, value)
+    let edit = replace(scene, target, key, value)?;
+    if key == "shape.mesh.file" { fit_mesh(scene, edit) } else { Ok(edit) }
 }
 
 /// Sets the number at index `component` of the value of `key`.
@@ -107,13 +112,24 @@ pub(super) fn replace(
     if !node_at_mut(part, key).is_some_and(|node| node.set_value(value)) {
         return Err(EditError::new(&format!("{key} cannot be set here"), ""));
     }
+    if key == PRESET {
+        part.rebase();
+    }
     let note = gone.map(|rival| format!("{first} replaces {rival}."));
+    let is_unseen = match target {
+        Target::Material(name) => key == "metal" && !next.materials[name].shows_f0(),
+        _ => false,
+    };
+    let note =
+        note.or_else(|| is_unseen.then(|| format!("metal has no effect here. {METAL_REMEDY}")));
     Ok(Edit::checked(next, target.clone(), label(scene, target, key))?.with_note(note))
 }
 
 /// Gives the optional `key` its default, or removes the transform step that it names.
 fn clear(scene: &Scene, target: &Target, key: &str, field: &Field) -> Result<Edit, EditError> {
     let mut next = scene.clone();
+    let base = part(scene, target)?.base();
+    let of_base = base.and_then(|base| node_at(base.as_ref(), key)?.value());
     if let (Target::Object(object), Some(step)) = (target, key.strip_prefix("transform.")) {
         let steps = &mut next.objects[*object].transform;
         match step.split('.').next().and_then(|index| index.parse::<usize>().ok()) {
@@ -121,13 +137,14 @@ fn clear(scene: &Scene, target: &Target, key: &str, field: &Field) -> Result<Edi
             _ => return Err(EditError::new(&format!("there is no step {key}"), "")),
         }
     } else if let Some(node) = node_at_mut(part_mut(&mut next, target)?, key) {
-        match field.preset {
-            DefaultValue::Required => {
+        match (field.preset, of_base) {
+            (DefaultValue::Required, _) => {
                 let found = format!("{} must not be left out", field.name);
                 return Err(EditError::new(&found, &format!("Expected {}.", field.takes)));
             }
-            DefaultValue::Is(text) => drop(node.set_value(parse(field, text)?)),
-            DefaultValue::Without(_) => node.make_absent(),
+            (DefaultValue::Is(_), Some(value)) => drop(node.set_value(value)),
+            (DefaultValue::Is(text), None) => drop(node.set_value(parse(field, text)?)),
+            (DefaultValue::Without(_), _) => node.make_absent(),
         }
     }
     Edit::checked(next, target.clone(), label(scene, target, key))

@@ -1,6 +1,6 @@
 //! Writing of new parts of a scene file, without default values, in the layout of the manual.
 
-use crate::value::{Color, DefaultValue, Field, ValueType};
+use crate::value::{Color, DefaultValue, Field, PRESET, ValueType};
 use toml::Value;
 use toml_edit::{Array, InlineTable, Item, Table};
 
@@ -62,8 +62,11 @@ pub(crate) fn fresh_entry(fields: &'static [Field], value: &Value) -> Table {
 /// except for kinds (`shape`, `view_angle`), which have dotted keys.
 pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Table {
     let mut table = Table::new();
+    // A preset replaces the defaults, and `values` has only the keys that override it.
+    let overrides = values.contains_key(PRESET);
     for field in fields {
-        let Some(value) = values.get(field.name).filter(|v| !is_default(field, v)) else {
+        let is_written = |value: &&Value| overrides || !is_default(field, value);
+        let Some(value) = values.get(field.name).filter(is_written) else {
             continue;
         };
         let dotted = matches!(field.takes, ValueType::OneOf(_));
@@ -78,7 +81,7 @@ pub(crate) fn preset(text: &str) -> Option<Value> {
 }
 
 /// Returns `true` if `value` is the default of the key `field`.
-fn is_default(field: &Field, value: &Value) -> bool {
+pub(crate) fn is_default(field: &Field, value: &Value) -> bool {
     match field.preset {
         DefaultValue::Is(text) => preset(text).as_ref() == Some(value),
         DefaultValue::Required | DefaultValue::Without(_) => false,

@@ -3,10 +3,10 @@
 //! have changed. A key that is not in the text is written only if it differs from its default.
 
 use crate::format::comments::CommentKeeper;
-use crate::format::emit::{color, fresh, fresh_entry, leaf};
+use crate::format::emit::{color, fresh, fresh_entry, is_default, leaf};
 use crate::format::list_diff::align;
 use crate::format::schema;
-use crate::value::{Color, Field, ValueType};
+use crate::value::{Color, Field, PRESET, ValueType};
 use toml::Value;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike};
 
@@ -61,14 +61,21 @@ fn patch_table(
     takes: ValueType,
 ) {
     let old = if let ValueType::Named(_) = takes { &rename(table, old, new) } else { old };
+    // A table that loses its preset gets all keys.
+    let is_omitted = |key: &str, value: &Value| {
+        let ValueType::Table(fields) = takes else { return false };
+        let field = fields.iter().find(|field| field.name == key);
+        !new.contains_key(PRESET) && field.is_some_and(|field| is_default(field, value))
+    };
     let mut removed = Vec::new();
     let mut added = Vec::new();
     for (key, takes) in keys(takes, old, new) {
         match (old.get(&key), new.get(&key)) {
             (Some(_), None) if table.contains_key(&key) => removed.push(key),
-            (old, Some(new)) if old != Some(new) => match table.get_mut(&key) {
-                Some(item) => patch_item(keeper, item, headers, old, new, takes),
-                None => added.push((key, takes, new)),
+            (old, Some(value)) if old != Some(value) => match table.get_mut(&key) {
+                Some(item) => patch_item(keeper, item, headers, old, value, takes),
+                None if is_omitted(&key, value) => {}
+                None => added.push((key, takes, value)),
             },
             _ => {}
         }

@@ -9,7 +9,7 @@ use crate::format::suggest::{did_you_mean, nearest};
 use crate::light::{self, LightKind};
 use crate::material;
 use crate::value::{
-    DefaultValue, Description, Field, KeyNode, ValueType, integer, names, read_value,
+    DefaultValue, Description, Field, KeyNode, PRESET, ValueType, integer, names, read_value,
     sort_by_number, truncated,
 };
 use crate::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
@@ -171,10 +171,15 @@ impl SchemaReader<'_> {
         node: &mut dyn KeyNode,
     ) {
         let mut intended = Vec::new();
-        for (key, value) in table {
+        let (preset, others): (Vec<_>, Vec<_>) =
+            table.iter().partition(|(key, _)| key.get_ref() == PRESET);
+        for (key, value) in preset.into_iter().chain(others) {
             match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
                 Some(field) => self.child(field.name, field.takes, value, node),
                 None => intended.extend(self.unknown(key, fields)),
+            }
+            if key.get_ref() == PRESET {
+                node.rebase();
             }
         }
         for field in fields.iter().filter(|f| f.preset == DefaultValue::Required) {

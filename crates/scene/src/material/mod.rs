@@ -6,6 +6,7 @@ mod bsdf;
 mod fresnel;
 mod mapping;
 mod microfacet;
+mod preset;
 mod refraction;
 mod rough_interface;
 mod texture;
@@ -18,6 +19,7 @@ pub use bsdf::{
 pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
 pub use mapping::TextureMapping;
 pub use microfacet::{FacetNormals, MicrofacetDistribution, SMOOTH_ALPHA};
+pub use preset::Preset;
 pub use refraction::{FresnelSplit, Interface};
 pub use rough_interface::{InterfaceMedia, InterfaceQuery, InterfaceSample};
 pub use texture::{
@@ -31,6 +33,8 @@ use crate::value::{Color, Description, Field, KeyNode, ValidationError, choices,
 description! {
     /// A surface's material. Every key may be left out.
     pub struct Material {
+        /// Material by name, whose values the other keys override.
+        preset: Option<Preset>, or "no preset";
         /// Body colour: multiplies the ambient and the diffuse part.
         color: Color = [0.8, 0.8, 0.8], in COEFFICIENT;
         /// Ambient coefficient k_a.
@@ -68,9 +72,9 @@ description! {
         /// Model of masking and shadowing between microfacets.
         masking: Masking = "v-cavity";
         /// Dependence of the reflectance on the angle.
-        fresnel: Option<Fresnel>, or "`exact` for a metal, otherwise `constant`";
+        fresnel: Option<Fresnel>, or "`exact` for a metal, that of `preset`, or `constant`";
         /// Reflectance F0 at normal incidence. Not together with `metal`.
-        f0: Option<Color>, or "white", in SHARE;
+        f0: Option<Color>, or "that of `preset`, or white", in SHARE;
         /// Metal whose reflectance the surface has. Not together with `f0`.
         metal: Option<Metal>, or "no metal";
         /// Radiance that the surface emits, the same at every point and in every direction; 0 emits
@@ -87,6 +91,7 @@ description! {
         texture: Option<Texture>, or "a uniform colour";
         /// Heights that perturb the shading normals; the outline of the surface does not change.
         bump: Option<Bump>, or "no bumps";
+        based on preset_material;
     }
 }
 
@@ -159,6 +164,10 @@ choices! {
     }
 }
 
+/// Remedy for a metal without effect.
+pub(crate) const METAL_REMEDY: &str =
+    "Only a reflection shows a metal: give it reflection = 1.0 and diffuse = 0.0, or a preset.";
+
 impl Metal {
     /// Returns the reflectance F0 at normal incidence.
     pub fn f0(self) -> Color {
@@ -172,20 +181,28 @@ impl Metal {
 }
 
 impl Material {
+    /// Returns the material without overrides if there is a preset.
+    fn preset_material(&self) -> Option<Self> {
+        self.preset.map(Preset::material)
+    }
+
     /// Returns the reflectance at normal incidence: that of `metal`, or `f0`, or that of a
-    /// dielectric with the index `ior`; white if none of these is given.
+    /// dielectric with the index `ior`, or that of `preset`; white if none of these is given.
     pub fn f0(&self) -> Color {
         let default = match self.fresnel_mode() {
             Fresnel::Dielectric => Color([f0_from_index(self.ior); 3]),
-            Fresnel::Constant | Fresnel::Schlick | Fresnel::Exact => Color::WHITE,
+            Fresnel::Constant | Fresnel::Schlick | Fresnel::Exact => {
+                self.preset.and_then(Preset::f0).unwrap_or(Color::WHITE)
+            }
         };
         self.metal.map(Metal::f0).or(self.f0).unwrap_or(default)
     }
 
     /// Returns the value of the key `fresnel`, or its default.
     pub fn fresnel_mode(&self) -> Fresnel {
-        let default = if self.metal.is_some() { Fresnel::Exact } else { Fresnel::Constant };
-        self.fresnel.unwrap_or(default)
+        let of_metal = self.metal.map(|_| Fresnel::Exact);
+        let given = self.fresnel.or(of_metal).or_else(|| self.preset?.fresnel());
+        given.unwrap_or(Fresnel::Constant)
     }
 
     /// Returns the alpha of the microfacet distribution. By default, the distribution has the same
@@ -211,6 +228,11 @@ impl Material {
         self.emitted() != [0.0; 3]
     }
 
+    /// Returns `true` if the reflectance F0 has an effect.
+    pub fn shows_f0(&self) -> bool {
+        self.reflection > 0.0 || self.highlight == Highlight::CookTorrance && self.specular > 0.0
+    }
+
     /// Returns `true` if the reflection or the highlight uses a microfacet distribution.
     pub fn has_microfacets(&self) -> bool {
         matches!(self.lobe, Lobe::Beckmann | Lobe::Ggx)
@@ -221,7 +243,7 @@ impl Material {
     pub fn faults(&self) -> Vec<ValidationError> {
         let both = self.f0.is_some() && self.metal.is_some();
         let given = self.metal.map(|_| "metal").or(self.f0.map(|_| "f0"));
-        let redundant = given.filter(|_| self.fresnel == Some(Fresnel::Dielectric));
+        let redundant = given.filter(|_| self.fresnel_mode() == Fresnel::Dielectric);
         self.validator()
             .and(both.then(|| {
                 ValidationError::new(
@@ -299,7 +321,7 @@ mod tests {
             "emission_color",
         ];
         assert_eq!(keys, numbers);
-        assert_eq!(FIELDS.len(), numbers.len() + 8, "check the range of the new field here");
+        assert_eq!(FIELDS.len(), numbers.len() + 9, "check the range of the new field here");
         bad = Material { metal: Some(Metal::Gold), ..Material::default() };
         assert!(bad.faults().is_empty());
         bad.f0 = Some(Color::WHITE);

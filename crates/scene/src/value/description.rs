@@ -217,6 +217,8 @@ pub(crate) use choices;
 ///         flatten placement: Placement, after 3;
 ///         // A private field for the content of the key `file`.
 ///         loads content: Loaded<Image>;
+///         // Method that returns the values of omitted keys, if `preset` determines them.
+///         based on preset_material;
 ///         // An example in TOML.
 ///         example "example = { center = [0.0, 1.0, 0.0] }";
 ///     }
@@ -239,6 +241,7 @@ macro_rules! description {
             )+
             $(flatten $flat:ident: $flat_type:ty, after $position:literal;)?
             $(loads $hidden:ident: $hidden_type:ty;)?
+            $(based on $base:ident;)?
             $(example $example:literal;)?
         }
     ) => {
@@ -302,6 +305,16 @@ macro_rules! description {
                     $(.flattened(&self.$flat))?
                     $(.and(self.$hidden.fault()))?
             }
+
+            $(
+                fn base(&self) -> Option<Box<dyn $crate::value::KeyNode>> {
+                    self.$base().map(|base| Box::new(base) as _)
+                }
+
+                fn rebase(&mut self) {
+                    *self = self.$base().unwrap_or_else(|| self.clone());
+                }
+            )?
 
             $crate::value::children! { $(stringify!($key) => $key),+ $(; $flat: $flat_type)? }
         }

@@ -3,6 +3,9 @@
 use crate::value::Validator;
 use std::collections::BTreeMap;
 
+/// Key whose value determines [`KeyNode::base`].
+pub(crate) const PRESET: &str = "preset";
+
 /// Value of a key as edits read and write it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum KeyValue {
@@ -74,6 +77,15 @@ pub trait KeyNode {
     fn make_child(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
         self.child_mut(key)
     }
+
+    /// Returns a table with the values that omitted keys have by the key [`PRESET`]; `None` if they
+    /// have their declared defaults.
+    fn base(&self) -> Option<Box<dyn KeyNode>> {
+        None
+    }
+
+    /// Gives all keys the values of [`KeyNode::base`], if there is one.
+    fn rebase(&mut self) {}
 
     /// Returns a validator that has checked each value of a table against the range of its key.
     fn validator(&self) -> Validator {

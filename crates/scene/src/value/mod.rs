@@ -24,6 +24,7 @@ pub use direction::unit;
 pub use field::{Choice, DefaultValue, Field, Step, ValueType};
 pub(crate) use field::{inserted, names};
 pub use hash::{Fnv1a64, fnv1a64};
+pub(crate) use key_node::PRESET;
 pub use key_node::{KeyNode, KeyValue, node_at, node_at_mut};
 pub use number_range::{NumberRange, number};
 pub(crate) use one_of::{kinds, one_of};

@@ -60,7 +60,7 @@ fn number(value: &DeValue) -> Option<f64> {
 }
 
 /// Converts `node` of the type `takes` to a TOML table, list or value, without absent optional
-/// keys.
+/// keys and keys with the values of [`KeyNode::base`].
 pub(crate) fn written(takes: ValueType, node: &dyn KeyNode) -> Value {
     let list = |entry: ValueType| {
         let entries = (0..).map_while(|i: usize| node.child(&i.to_string()));
@@ -68,10 +68,14 @@ pub(crate) fn written(takes: ValueType, node: &dyn KeyNode) -> Value {
     };
     match takes {
         ValueType::Table(fields) | ValueType::OneOf(fields) => {
+            let base = node.base();
             let entry = |field: &Field| {
                 let child = node.child(field.name)?;
-                let is_left_out =
-                    child.is_absent() && matches!(field.preset, DefaultValue::Without(_));
+                let of_base = base.as_ref().and_then(|base| base.child(field.name));
+                let is_left_out = match field.preset {
+                    DefaultValue::Without(_) => child.is_absent(),
+                    _ => of_base.is_some_and(|of_base| of_base.value() == child.value()),
+                };
                 (!is_left_out).then(|| (field.name.to_string(), written(field.takes, child)))
             };
             Value::Table(fields.iter().filter_map(entry).collect())

@@ -17,6 +17,7 @@ use std::time::Duration;
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::export::{Provenance, scene_hash};
 use zerkalo_render::image_file::{Depth, ImageOutput};
+use zerkalo_render::schedule::Interval;
 use zerkalo_render::session::{Picture, Session, State};
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::Existing;
@@ -51,7 +52,7 @@ impl Exporter {
         let noise = noise.map_or("unknown".to_string(), |n| format!("{:.2} levels", n.rmse.levels));
         Ok(Exported {
             description: format!("{width}x{height}  {spp:.0} spp  noise {noise}"),
-            advice: format!("o shows it, y copies the path  ·  scp {} .", scp(&path)),
+            advice: format!("scp {} .  ·  o shows it, y copies the path", scp(&path)),
             path,
             is_image: true,
         })
@@ -148,7 +149,7 @@ fn finish(
     format: Format,
     exporter: Exporter,
     cancelled: &AtomicBool,
-    report_progress: impl Fn(Option<f64>),
+    report_progress: impl Fn(Option<(f64, Option<Interval>)>),
 ) -> Option<Result<Exported, String>> {
     loop {
         if cancelled.load(Ordering::Relaxed) {
@@ -159,7 +160,8 @@ fn finish(
             State::Finished(_) => break,
             State::Failed(why) => return Some(Err(why)),
             State::Idle | State::Tracing | State::Paused => {
-                report_progress(Some(snapshot.report.progress.unwrap_or(0.0)));
+                let progress = snapshot.report.progress.unwrap_or(0.0);
+                report_progress(Some((progress, snapshot.report.eta_seconds)));
             }
         }
     }

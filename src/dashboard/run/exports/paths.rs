@@ -41,6 +41,18 @@ pub fn full(path: &Path) -> String {
     path.to_string_lossy().into_owned()
 }
 
+/// Returns the URL of the file at `path` on this machine, for links in the terminal.
+pub fn url(path: &Path) -> String {
+    let path = full(path);
+    let encoded = path.bytes().map(|byte| match byte {
+        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' | b'~' => {
+            char::from(byte).to_string()
+        }
+        _ => format!("%{byte:02X}"),
+    });
+    format!("file://{}{}", host_name(), encoded.collect::<String>())
+}
+
 /// Returns the argument of scp that copies the file at `path` from this machine:
 /// `user@host:/absolute/path`, after `-P PORT ` if the port of SSH is not 22. Both are quoted for a
 /// shell where necessary.
@@ -124,5 +136,6 @@ mod tests {
             assert_eq!(scp_from(connection, user, "box", path), expected);
         }
         assert!(scp(Path::new("a.png")).contains(":/"));
+        assert!(url(Path::new("/a b.png")).ends_with("/a%20b.png"));
     }
 }

@@ -53,6 +53,12 @@ impl Autosave {
         }
     }
 
+    /// Removes the recovery file, and continues with another scene as [`Autosave::new`] does.
+    pub fn reopen(&mut self, path: Option<&Path>, name: &str) {
+        self.recovery.forget();
+        *self = Self::new(path, name, self.state.take());
+    }
+
     /// Updates an existing recovery file before `scene` is saved. Otherwise a program that is
     /// killed during the save would leave older edits, which the next start would offer.
     pub fn saving(&mut self, file: &SceneFile, scene: &Arc<Scene>) {

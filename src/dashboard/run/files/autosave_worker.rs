@@ -19,6 +19,9 @@ pub enum AutosaveJob {
     Saving(Arc<Scene>, Sender<()>),
     /// Record that the scene was written to the file at this path.
     Saved(Arc<Scene>, PathBuf),
+    /// Remove the recovery file, and keep the edits of the scene at this path or, without a path, of
+    /// this name.
+    Opened(Option<PathBuf>, String),
     /// Recover the edits of the last [`Message::OrphanedEdits`].
     Recover,
     Discard,
@@ -29,7 +32,7 @@ pub enum AutosaveJob {
 /// State of the thread that writes the recovery file.
 pub struct AutosaveWorker {
     pub autosave: Autosave,
-    /// Path of the scene file at the start.
+    /// Path of the scene file as it was opened.
     pub path: Option<PathBuf>,
     pub shared: SharedFile,
     /// Sender of jobs to the thread that reads and writes the scene file.
@@ -80,6 +83,12 @@ impl AutosaveWorker {
             AutosaveJob::Saved(scene, path) => {
                 self.autosave.saved(&scene, &path, Instant::now());
                 self.write_and_warn();
+            }
+            AutosaveJob::Opened(path, name) => {
+                self.autosave.reopen(path.as_deref(), &name);
+                self.path = path;
+                let messages = self.with_file(|autosave, file| autosave.search(file));
+                messages.into_iter().for_each(|message| self.send(message));
             }
             AutosaveJob::Recover => {
                 let is_unreadable = self.shared.get().is_none();

@@ -1,9 +1,9 @@
 //! Thread that reads and writes the scene file and checks it for changes by other programs.
 
-use crate::dashboard::Message;
-use crate::dashboard::run::files::{AutosaveJob, SharedFile};
+use crate::dashboard::run::files::{AutosaveJob, SharedFile, scene_list};
+use crate::dashboard::{Message, OpenedScene, SceneSource, short_name};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_scene::disk::FileStamp;
@@ -24,6 +24,10 @@ pub enum Job {
     },
     /// Read the scene file.
     Load,
+    /// Replace the scene by another one.
+    Open(SceneSource),
+    /// List the scenes that can be opened.
+    List,
     /// Continue with this text, recovered for an unreadable scene file.
     Adopt(Box<SceneFile>),
     End,
@@ -35,6 +39,8 @@ pub struct FileWorker {
     pub file: Option<SceneFile>,
     /// Stamp of the scene file when it was last read, written or checked.
     pub seen: Option<FileStamp>,
+    /// `true` if the scene file had errors at the latest check.
+    pub is_broken: bool,
     /// Meshes and images that had changed at the latest check.
     pub seen_assets: Vec<(PathBuf, Option<FileStamp>)>,
     /// State folder of the user (XDG).
@@ -59,6 +65,14 @@ impl FileWorker {
                     let loaded = self.load();
                     self.send(Message::Loaded(Box::new(loaded)));
                 }
+                Ok(Job::Open(source)) => {
+                    let opened = self.open(&source);
+                    self.send(Message::Opened(Box::new(opened)));
+                }
+                Ok(Job::List) => {
+                    let folder = self.path.as_deref().and_then(Path::parent);
+                    self.send(Message::Scenes(scene_list::names(folder, self.state.as_deref())));
+                }
                 Ok(Job::Adopt(file)) => self.file = Some(*file),
                 Err(RecvTimeoutError::Timeout) => {}
                 Ok(Job::End) | Err(RecvTimeoutError::Disconnected) => break,
@@ -66,8 +80,8 @@ impl FileWorker {
             let now = Instant::now();
             if next_check <= now {
                 checked = now;
-                if self.changed() {
-                    self.send(Message::ChangedOnDisk);
+                if let Some(change) = self.changed() {
+                    self.send(change);
                 } else if self.assets_changed() {
                     self.send(Message::AssetsChanged);
                 }
@@ -80,18 +94,58 @@ impl FileWorker {
         let _ = self.results.send(message);
     }
 
-    /// Returns `true` if another program has changed the scene file since the last read, write or
-    /// check.
-    fn changed(&mut self) -> bool {
-        let Some(path) = &self.path else { return false };
+    /// Returns the message that another program has changed the scene file since the last read,
+    /// write or check; `None` if none has.
+    fn changed(&mut self) -> Option<Message> {
+        let path = self.path.as_ref()?;
         let now = FileStamp::of(path);
         if self.seen == now {
-            return false;
+            return None;
         }
         self.seen = now;
-        match &self.file {
-            Some(file) => file.on_disk() == DiskState::Changed,
-            None => now.is_some(),
+        let Some(file) = &self.file else {
+            return now.map(|_| Message::ChangedOnDisk);
+        };
+        let was_broken = std::mem::take(&mut self.is_broken);
+        if file.on_disk() != DiskState::Changed {
+            return was_broken.then_some(Message::MendedOnDisk);
+        }
+        let assets = file.document.scene().resolver.assets.clone();
+        match SceneFile::open_with(path, assets) {
+            Ok(_) => Some(Message::ChangedOnDisk),
+            Err(errors) => {
+                self.is_broken = true;
+                Some(Message::BrokenOnDisk(errors))
+            }
+        }
+    }
+
+    fn open(&mut self, source: &SceneSource) -> Result<OpenedScene, SceneErrors> {
+        let assets = self.file.as_ref().map(|file| file.document.scene().resolver.assets.clone());
+        let file = source.open(assets.unwrap_or_default())?;
+        self.path = file.path().map(Path::to_path_buf);
+        self.seen = self.path.as_deref().and_then(FileStamp::of);
+        self.is_broken = false;
+        let opened = OpenedScene {
+            scene: Arc::new(file.document.scene().clone()),
+            path: self.path.clone(),
+            name: self.path.as_deref().map_or(file.document.name.clone(), short_name),
+            is_new: self.path.is_some() && self.seen.is_none(),
+        };
+        let recovery = Recovery::new(self.path.as_deref(), &opened.name, self.state.as_deref());
+        self.shared.set_elsewhere(recovery.elsewhere());
+        self.shared.put(&file);
+        self.file = Some(file);
+        let job = AutosaveJob::Opened(self.path.clone(), opened.name.clone());
+        let _ = self.autosaves.send(job);
+        self.remember();
+        Ok(opened)
+    }
+
+    /// Adds the scene file to the list of recent ones.
+    fn remember(&self) {
+        if let (Some(path), Some(state)) = (&self.path, &self.state) {
+            scene_list::remember(path, state);
         }
     }
 
@@ -126,6 +180,8 @@ impl FileWorker {
         self.shared.put(file);
         let _ = self.autosaves.send(AutosaveJob::Saved(Arc::clone(scene), path.clone()));
         self.path = Some(path.clone());
+        self.is_broken = false;
+        self.remember();
         Ok(path)
     }
 

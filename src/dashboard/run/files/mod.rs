@@ -4,6 +4,7 @@
 mod autosave;
 mod autosave_worker;
 mod file_worker;
+mod scene_list;
 mod shared_file;
 
 use crate::dashboard::Message;
@@ -75,6 +76,7 @@ impl Files {
             path,
             file,
             seen,
+            is_broken: false,
             seen_assets: Vec::new(),
             state,
             autosaves: autosaves.clone(),

@@ -1,0 +1,49 @@
+//! Grid on the ground, which the picture's panel shows for a scene without objects.
+
+use glam::DVec3;
+use zerkalo_scene::Scene;
+use zerkalo_scene::edit::step_length;
+use zerkalo_terminal::cells::Raster;
+
+const DARK: [u8; 3] = [20, 22, 28];
+const LINE: [u8; 3] = [72, 78, 92];
+/// Colours of the lines x = 0 and z = 0.
+const AXES: [[u8; 3]; 2] = [[70, 110, 190], [190, 80, 80]];
+
+/// Returns the grid of lines at height 0, as the camera of `scene` sees it. Squares have ten steps of
+/// the arrow keys; lines end where they would be closer than two pixels.
+pub fn raster(scene: &Scene, [width, height]: [usize; 2]) -> Raster {
+    let camera = &scene.camera;
+    let (eye, [right, up, forward]) = (DVec3::from_array(camera.eye), camera.frame());
+    let [half_width, half_height] = camera.half_size(scene.film.size.map(f64::from));
+    let square = 10.0 * step_length(scene);
+    // Position on the ground in squares.
+    let ground = |x: usize, y: usize| {
+        let across = |at: usize, of: usize| (2 * at + 1) as f64 / of as f64 - 1.0;
+        let [x, y] = [across(x, width) * half_width, -across(y, height) * half_height];
+        let direction = forward + right * x + up * y;
+        let t = -eye.y / direction.y;
+        (t > 0.0 && t.is_finite()).then(|| [0, 2].map(|axis| (eye + direction * t)[axis] / square))
+    };
+    Raster::from_fn(width, height, |i| {
+        let (x, y) = (i % width, i / width);
+        let (Some(here), Some(beside), Some(below)) =
+            (ground(x, y), ground(x + 1, y), ground(x, y + 1))
+        else {
+            return DARK;
+        };
+        let line = |axis: usize| {
+            let near = [beside, below].map(|other| other[axis]);
+            let crossed = near.iter().map(|other| other.floor().max(here[axis].floor()));
+            let is_sparse = near.iter().all(|other| (other - here[axis]).abs() < 0.5);
+            let changed = near.iter().any(|other| other.floor() != here[axis].floor());
+            (is_sparse && changed).then(|| crossed.fold(f64::NEG_INFINITY, f64::max) == 0.0)
+        };
+        match [line(0), line(1)] {
+            [Some(true), _] => AXES[0],
+            [_, Some(true)] => AXES[1],
+            [None, None] => DARK,
+            _ => LINE,
+        }
+    })
+}

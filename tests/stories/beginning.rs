@@ -1,0 +1,72 @@
+//! Stories of a scene that begins as a new file, with keys counted.
+
+use super::*;
+use zerkalo_scene::material::Preset;
+
+/// Number of keys that [`Desk::keys`] presses for `keys`.
+fn count(keys: &str) -> usize {
+    let parts = keys.split('`').enumerate();
+    parts
+        .map(|(i, part)| if i % 2 == 1 { part.len() } else { part.split_whitespace().count() })
+        .sum()
+}
+
+#[test]
+fn new_file_becomes_a_lit_scene_and_a_picture_in_seventy_keys() {
+    let mut desk = Desk::on_new_file();
+    assert!(desk.model.is_empty() && !desk.model.is_unsaved());
+    let keys = "a `gold` Enter a `glass` Enter a `diffuse` Enter a `floor` Enter a `mirror` Enter \
+                A `warm` Enter A `cool` Enter Ctrl-s Ctrl-e Ctrl-u `1920x1080` Enter";
+    assert!(count(keys) <= 70, "{} keys", count(keys));
+    desk.keys(keys);
+    let scene = desk.scene();
+    let names: Vec<_> = scene.objects.iter().map(|object| object.name.as_str()).collect();
+    let expected = ["gold ball", "glass ball", "red ball", "floor", "mirror frame", "mirror"];
+    assert_eq!(names, expected);
+    let names: Vec<_> = scene.lights.iter().map(|light| light.name.as_str()).collect();
+    assert_eq!(names, ["warm lamp", "cool window"]);
+    assert_eq!(scene.materials["gold"].preset, Some(Preset::Gold));
+    assert!(scene.materials["mirror"].roughness > 0.0 && scene.materials["floor"].reflection > 0.0);
+    assert!(!desk.model.is_unsaved() && !desk.model.file.is_new);
+    assert_eq!(Scene::parse(&desk.disk[Path::new(FILE)], FILE).unwrap(), *scene);
+    let is_full_hd = |e: &Effect| match e {
+        Effect::ExportSized { scene, .. } => scene.film.size == [1920, 1080],
+        _ => false,
+    };
+    assert!(desk.asked(is_full_hd));
+    desk.undo_all();
+    assert!(desk.model.is_empty());
+}
+
+#[test]
+fn another_scene_opens_after_unsaved_edits_are_saved_or_discarded() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("Left Ctrl-n");
+    assert!(matches!(desk.model.overlay, Some(Overlay::Question(_))));
+    desk.keys("Esc");
+    assert!(desk.model.is_unsaved() && desk.model.next_scene.is_none());
+    desk.keys("Ctrl-n `s`");
+    assert!(desk.scene().objects.is_empty() && desk.disk[Path::new(FILE)] != ROOM);
+    desk.keys("a Enter Enter O `room` Enter `d`");
+    assert_eq!((desk.scene().objects.len(), desk.model.is_unsaved()), (3, false));
+    desk.disk.insert("bad.toml".into(), "[camera".into());
+    desk.send(Message::Scenes(vec![("bad.toml".to_string(), "file")]));
+    desk.keys("Enter");
+    assert_eq!(desk.scene().objects.len(), 3, "{}", desk.notice());
+    assert!(desk.notice().contains("not TOML"), "{}", desk.notice());
+}
+
+#[test]
+fn banner_of_a_broken_file_goes_when_the_file_is_good_again() {
+    let mut desk = Desk::new(ROOM);
+    let errors = || Scene::parse("[camera", FILE).unwrap_err();
+    desk.send(Message::BrokenOnDisk(errors()));
+    assert!(desk.model.file.broken.is_some() && desk.notice().contains("not TOML"));
+    desk.send(Message::MendedOnDisk);
+    assert!(desk.model.file.broken.is_none());
+    desk.keys("Left");
+    desk.send(Message::BrokenOnDisk(errors()));
+    desk.send(Message::ChangedOnDisk);
+    desk.keys("`k`");
+    assert!(desk.model.file.broken.is_none() && desk.model.is_unsaved());
+}
