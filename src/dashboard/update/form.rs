@@ -8,13 +8,13 @@ use zerkalo_scene::edit::{self, Edit, EditError};
 impl UpdateContext<'_> {
     pub(super) fn pick_object(&mut self) {
         self.open_pick("add an object", edit::object_kinds(), 0, |c, kind| {
-            c.open_form(kind, edit::add_object(c.scene(), kind, None));
+            c.open_form(kind, c.edit_seen(|seen| edit::add_object(seen, kind, None)));
         });
     }
 
     pub(super) fn pick_light(&mut self) {
         self.open_pick("add a light", edit::light_kinds(), 0, |c, kind| {
-            c.open_form(&format!("{kind} light"), edit::add_light(c.scene(), kind));
+            c.open_form(&format!("{kind} light"), c.edit_seen(|seen| edit::add_light(seen, kind)));
         });
     }
 
