@@ -10,6 +10,7 @@ use std::time::Duration;
 use zerkalo_render::film::{Display, LinearImage, PixelProbe};
 use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{Snapshot, WatchReport};
+use zerkalo_scene::camera::Camera;
 use zerkalo_scene::edit::Target;
 use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{History, Scene, SceneErrors};
@@ -132,6 +133,15 @@ pub struct Drag {
     pub in_picture: bool,
 }
 
+/// View that is not the camera of the scene.
+#[derive(Clone, Debug)]
+pub struct FreeView {
+    /// Camera of the scene while this view is seen.
+    pub left: Camera,
+    /// Scene with the camera of the view.
+    pub scene: Arc<Scene>,
+}
+
 /// State of the dashboard, from which the screen is drawn.
 #[derive(Debug, Default)]
 pub struct Model {
@@ -140,6 +150,8 @@ pub struct Model {
     pub file: File,
     /// Edited scene with its undo history.
     pub history: History,
+    /// View in the picture; `None` while it is that of the scene's camera.
+    pub view: Option<FreeView>,
     /// Selected part of the scene, which always exists.
     pub selection: Target,
     pub focus: Focus,
@@ -244,7 +256,8 @@ impl Model {
         }
     }
 
-    /// Returns the scene to render: the preview of an open form, otherwise the edited scene.
+    /// Returns the scene that edits start from: the preview of an open form, otherwise the edited
+    /// scene.
     pub fn scene(&self) -> &Arc<Scene> {
         match &self.overlay {
             Some(Overlay::Form(form)) => &form.scene,
@@ -255,6 +268,33 @@ impl Model {
     /// Returns `true` if there is no object to see.
     pub fn is_empty(&self) -> bool {
         self.watch.is_none() && !self.file.unreadable && self.scene().objects.is_empty()
+    }
+
+    /// Returns the scene to render: [`Model::scene`] as the view shows it.
+    pub fn seen(&self) -> &Arc<Scene> {
+        self.view.as_ref().map_or(self.scene(), |view| &view.scene)
+    }
+
+    /// Shows the scene from `camera`, which is no edit.
+    pub(super) fn set_view(&mut self, camera: Camera) {
+        let scene = self.scene();
+        let free = camera != scene.camera && camera.faults().is_empty();
+        self.view = free.then(|| FreeView {
+            left: scene.camera.clone(),
+            scene: Arc::new(Scene { camera, ..Scene::clone(scene) }),
+        });
+    }
+
+    /// Shows edits of the scene in the view. The view follows an edit of the scene's camera: it
+    /// becomes the camera that was moved, or gets the lens that was changed.
+    pub(super) fn follow_edits(&mut self) {
+        let Some(FreeView { left, scene: seen }) = self.view.take() else { return };
+        let now = &self.scene().camera;
+        if *now == left {
+            self.set_view(seen.camera.clone());
+        } else if left.with_lens_of(now) == *now {
+            self.set_view(seen.camera.with_lens_of(now));
+        }
     }
 
     pub fn is_unsaved(&self) -> bool {

@@ -142,6 +142,7 @@ fn files_hold_provenance_metadata() {
         ("Software", concat!("zerkalo ", env!("CARGO_PKG_VERSION"))),
         ("Source", "scene.toml"),
         ("Scene hash", &hash),
+        ("Camera", "{ eye = ["),
         ("Seed", "42"),
         ("Samples per pixel", "8.00 (8-8)"),
         ("Noise", ""),

@@ -40,7 +40,7 @@ pub const KEYS: [(&str, &str); 10] = [
     ("[", "["),
     ("Left", "\x1b[D"),
     ("Up", "\x1b[A"),
-    ("PageUp", "\x1b[5~"),
+    ("H", "H"),
     ("Ctrl-s", "\x13"),
     ("p", "p"),
     ("P", "P"),

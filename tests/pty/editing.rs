@@ -14,6 +14,8 @@ fn edits_change_the_picture_and_undo_reverts_them() {
     terminal.send("uu");
     terminal.wait_until_gone("room.toml ●");
     terminal.send("\x1b[C\x1b[C");
+    terminal.wait_for_text("view, not the camera");
+    terminal.send("H");
     terminal.wait_for_text("room.toml ●");
     terminal.send("q");
     terminal.wait_for_text("nsaved");

@@ -69,9 +69,8 @@ fn perform(
         }
         14 => ("own material", edit::own_material(scene, &subject)),
         15 => ("store camera", edit::store_view(scene, (at % 2 == 0).then_some("left"))),
-        16 => ("recall camera", edit::recall_view(scene, "left")),
-        17 => ("roughen", edit::step_mirror(scene, Some(&subject), "roughness", amount.trunc())),
-        18 => ("reflect", edit::step_mirror(scene, Some(&subject), "reflection", amount.trunc())),
+        16 => ("roughen", edit::step_mirror(scene, Some(&subject), "roughness", amount.trunc())),
+        17 => ("reflect", edit::step_mirror(scene, Some(&subject), "reflection", amount.trunc())),
         _ => ("next lobe", edit::step_mirror(scene, None, "lobe", amount)),
     }
 }
@@ -133,7 +132,7 @@ fn random_edits_leave_valid_scenes_and_can_be_undone() {
     // An operation missing in the tally would go untested.
     for name in
         "step|fine step|set|set number|toggle|add object|add light|move|rotate|drop|duplicate|\
-         delete|rename|own material|store camera|recall camera|roughen|reflect|next lobe"
+         delete|rename|own material|store camera|roughen|reflect|next lobe"
             .split('|')
     {
         assert!(tally.get(name).is_some_and(|[done, _]| *done > 0), "{name}: {tally:?}");

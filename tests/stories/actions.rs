@@ -134,9 +134,15 @@ fn camera_stories() -> Vec<Story> {
             // The probe shows the front of the ball, and the focus is there.
             (d.scene().camera.focus_depth() - 4.5).abs() < 0.01
         }),
-        story("reset the camera to the file", "Left Up Home", |a, d| a.camera == d.scene().camera),
-        story("store this viewpoint", "n Ctrl-u `door` Enter", |a, d| {
-            d.scene().cameras["door"] == a.camera
+        story("back to the camera of the scene", "Left Up h", |a, d| {
+            a.camera == d.scene().camera && d.model.view.is_none()
+        }),
+        story("make this view the camera", "Left H", |_, d| {
+            eye(d)[0] < 0.0 && d.model.scene().camera == d.scene().camera && d.model.is_unsaved()
+        }),
+        story("store this viewpoint", "Left n Ctrl-u `door` Enter", |a, d| {
+            let scene = d.model.scene();
+            scene.cameras["door"] == d.scene().camera && scene.camera == a.camera
         }),
     ];
     for n in 1..=9 {
@@ -254,8 +260,8 @@ fn panel_stories() -> Vec<Story> {
 
 fn file_stories() -> Vec<Story> {
     vec![
-        story("undo", "Left u", |a, d| d.scene() == a && !d.model.is_unsaved()),
-        story("redo", "Left u U", |_, d| eye(d)[0] < 0.0),
+        story("undo", "Enter Right u", |a, d| d.scene() == a && !d.model.is_unsaved()),
+        story("redo", "Enter Left u U", |_, d| eye(d)[0] < 0.0),
         story("save", "Enter `7` Enter Ctrl-s", |_, d| {
             d.disk[Path::new(FILE)] == room_with_views().replacen("eye = [0.0", "eye = [7.0", 1)
                 && !d.model.is_unsaved()

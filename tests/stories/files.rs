@@ -18,7 +18,7 @@ fn press(model: &mut Model, keys: &str) -> Vec<Effect> {
 #[test]
 fn quit_with_unsaved_edits_asks() {
     let mut desk = Desk::new(ROOM);
-    desk.keys("Left q");
+    desk.keys("] q");
     assert!(matches!(desk.model.overlay, Some(Overlay::Question(_))));
     desk.keys("Ctrl-c Esc");
     assert!(!desk.asked(|e| *e == Effect::Quit) && desk.model.overlay.is_none());
@@ -28,11 +28,11 @@ fn quit_with_unsaved_edits_asks() {
     assert!(desk.asked(|e| *e == Effect::Quit));
     assert_ne!(desk.disk[Path::new(FILE)], ROOM);
     let mut desk = Desk::new(ROOM);
-    desk.keys("Left q `d`");
+    desk.keys("] q `d`");
     assert!(desk.asked(|e| *e == Effect::Quit));
     assert_eq!(desk.disk[Path::new(FILE)], ROOM);
     let mut desk = Desk::new(ROOM);
-    desk.keys("Left u q");
+    desk.keys("] u q");
     assert!(desk.asked(|e| *e == Effect::Quit), "nothing is left to save");
 }
 
@@ -40,7 +40,7 @@ fn quit_with_unsaved_edits_asks() {
 fn save_as_asks_before_overwriting() {
     let mut desk = Desk::new(ROOM);
     desk.disk.insert("other.toml".into(), "precious".into());
-    desk.keys("Left W Ctrl-u `other.toml` Enter");
+    desk.keys("] W Ctrl-u `other.toml` Enter");
     assert_eq!(desk.disk[Path::new("other.toml")], "precious");
     assert!(
         matches!(&desk.model.overlay, Some(Overlay::Question(q)) if q.text.contains("other.toml"))
@@ -55,7 +55,7 @@ fn save_as_asks_before_overwriting() {
 #[test]
 fn untitled_scene_asks_for_path_before_quitting() {
     let mut model = start(None, ROOM);
-    press(&mut model, "Left q s");
+    press(&mut model, "] q s");
     assert!(matches!(model.overlay, Some(Overlay::Prompt(_))));
     let effects = press(&mut model, "Enter");
     let Some(Effect::Save { scene, path, overwrite: false }) = effects.first() else {
@@ -69,7 +69,7 @@ fn untitled_scene_asks_for_path_before_quitting() {
 #[test]
 fn edit_during_save_stays_unsaved() {
     let mut model = start(Some(FILE), ROOM);
-    let effects = press(&mut model, "Left Ctrl-s Left");
+    let effects = press(&mut model, "] Ctrl-s ]");
     let save = effects.into_iter().find_map(|e| match e {
         Effect::Save { scene, .. } => Some(scene),
         _ => None,
@@ -81,7 +81,7 @@ fn edit_during_save_stays_unsaved() {
 #[test]
 fn save_over_external_change_asks() {
     let mut model = start(Some(FILE), ROOM);
-    press(&mut model, "Left Ctrl-s");
+    press(&mut model, "] Ctrl-s");
     let scene = Arc::clone(model.history.scene());
     let changed = Message::Saved(scene, Err(SaveError::Changed(FILE.into())));
     update(&mut model, changed, Duration::ZERO);
@@ -104,7 +104,7 @@ fn external_change_reloads_unless_edits_would_be_lost() {
     desk.send(Message::ChangedOnDisk);
     assert_eq!(desk.text(), other);
     assert_eq!(desk.model.selection, Target::Object(1), "found again by its name");
-    desk.keys("Left");
+    desk.keys("]");
     desk.disk.insert(FILE.into(), ROOM.into());
     desk.send(Message::ChangedOnDisk);
     desk.keys("Enter");
@@ -150,7 +150,7 @@ fn unreadable_file_loads_after_it_is_fixed() {
     assert!(model.file.unreadable);
     let errors = model.file.broken.as_ref().unwrap().to_string();
     assert!(errors.contains("room.toml:33") && errors.contains("radius is -1"), "{errors}");
-    let effects = press(&mut model, "Left a ] x m Ctrl-s Enter Tab Down Right p");
+    let effects = press(&mut model, "] a ] x m Ctrl-s Enter Tab Down Right p");
     assert!(effects.is_empty(), "{effects:?}");
     assert!(model.notice.as_ref().unwrap().text.contains("No scene"));
     assert_eq!(press(&mut model, "Ctrl-o"), [Effect::Load]);
@@ -159,7 +159,7 @@ fn unreadable_file_loads_after_it_is_fixed() {
     let effects = update(&mut model, loaded, Duration::ZERO);
     assert!(effects.contains(&Effect::Show(scene)));
     assert!(!model.file.unreadable && model.file.broken.is_none() && !model.is_unsaved());
-    assert!(!press(&mut model, "Left").is_empty());
+    assert!(!press(&mut model, "]").is_empty());
     let mut model = start(Some(FILE), &broken);
     assert_eq!(press(&mut model, "q"), [Effect::Quit]);
 }
@@ -171,7 +171,7 @@ fn error_in_changed_file_keeps_scene() {
     desk.send(Message::ChangedOnDisk);
     assert!(desk.notice().contains("room.toml:2") && desk.notice().contains("flim"));
     assert_eq!(desk.text(), ROOM);
-    desk.keys("Left Ctrl-s");
+    desk.keys("] Ctrl-s");
     assert!(matches!(desk.model.overlay, Some(Overlay::Question(_))), "not over it unasked");
     desk.keys("Esc u");
     desk.disk.insert(FILE.into(), ROOM.into());
@@ -192,7 +192,7 @@ fn built_in_scene_opens_without_file() {
 #[test]
 fn edit_during_save_prevents_quit() {
     let mut model = start(Some(FILE), ROOM);
-    let effects = press(&mut model, "Left q s Left");
+    let effects = press(&mut model, "] q s ]");
     let save = effects.into_iter().find_map(|e| match e {
         Effect::Save { scene, .. } => Some(scene),
         _ => None,

@@ -11,6 +11,7 @@ mod recovery;
 mod roughness;
 mod simulated_dashboard;
 mod table;
+mod view;
 mod watch;
 
 use crate::harness::*;

@@ -58,7 +58,7 @@ fn right_or_modified_click_focuses_lens() {
 }
 
 #[test]
-fn drag_is_one_undo_step() {
+fn drag_orbits_and_pans_view() {
     let mut desk = Desk::new(ROOM);
     let cell = middle(&desk);
     desk.drag(Button::Left, cell, [12, -4]);
@@ -66,11 +66,7 @@ fn drag_is_one_undo_step() {
     assert!(eye[0] < -0.5, "what is seen follows the hand: {eye:?}");
     desk.drag(Button::Right, cell, [5, 5]);
     assert!(desk.scene().camera.target.unwrap()[1] > 1.0, "the picture goes down, the eye up");
-    desk.keys("u");
-    assert_eq!(desk.scene().camera.eye, eye, "the second drag");
-    desk.keys("u");
-    assert_eq!(desk.text(), ROOM, "the first");
-    assert!(desk.model.history.undo().is_none());
+    assert!(desk.text() == ROOM && desk.model.history.undo().is_none(), "no edit");
 }
 
 #[test]
@@ -99,7 +95,7 @@ fn wheel_dollies_scrolls_and_steps() {
     let [x, y] = middle(&desk);
     desk.mouse(MouseKind::Scroll(2), x, y);
     assert!(desk.scene().camera.eye[2] < 4.2);
-    desk.keys("u");
+    desk.keys("h");
     let (rows, _) = desk.model.inspector_rows().unwrap();
     desk.click(rows.x + 1, rows.y);
     assert_eq!((desk.model.focus, desk.model.inspector.cursor), (Focus::Inspector, 0));
@@ -149,7 +145,7 @@ fn click_chooses_in_lists_and_questions() {
     let place = desk.model.overlay_layout().unwrap();
     desk.click(place.list.x + 1, place.list.y + 1).click(place.list.x + 1, place.list.y + 1);
     assert!(matches!(&desk.model.overlay, Some(Overlay::Form(form)) if form.title == "new cube"));
-    desk.keys("Esc Left q");
+    desk.keys("Esc ] q");
     let place = desk.model.overlay_layout().unwrap();
     desk.click(place.list.x + 1, place.list.y + 1).click(place.list.x + 1, place.list.y + 1);
     assert!(desk.asked(|e| *e == Effect::Quit), "discard and quit");

@@ -24,13 +24,13 @@ fn edits_are_autosaved_until_saved_or_undone() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Tab Down p v Esc");
     assert!(kept(&mut desk).is_empty(), "nothing was edited");
-    desk.keys("Left Left");
+    desk.keys("] ]");
     let scenes = kept(&mut desk);
     assert_eq!(scenes.len(), 2);
     assert_eq!(scenes[1].as_ref(), Some(desk.model.history.scene()));
     desk.keys("u");
     assert_eq!(kept(&mut desk).last(), Some(&None), "two steps of one gesture were undone");
-    desk.keys("Left Ctrl-s");
+    desk.keys("] Ctrl-s");
     assert_eq!(kept(&mut desk).last(), Some(&None));
     desk.keys("u");
     assert!(matches!(&kept(&mut desk)[..], [Some(_)]), "the file has what was undone");
@@ -73,7 +73,7 @@ fn orphaned_edits_can_be_recovered_later() {
     desk.send(Message::OrphanedEdits(orphaned_edits(&desk, true)));
     let Some(Overlay::Question(question)) = &desk.model.overlay else { panic!() };
     assert!(question.text.contains("changed since"), "{}", question.text);
-    desk.keys("`f` Left");
+    desk.keys("`f` ]");
     assert!(!desk.asked(|e| matches!(e, Effect::Recover | Effect::Discard)));
     desk.palette("recover edits of a crashed session").keys("`d`");
     assert!(desk.asked(|e| *e == Effect::Discard) && desk.model.is_unsaved());
@@ -107,7 +107,7 @@ fn orphaned_edits_equal_to_file_are_discarded() {
 #[test]
 fn suspend_emits_no_other_effect() {
     let mut desk = Desk::new(ROOM);
-    desk.keys("Left");
+    desk.keys("]");
     desk.effects.clear();
     desk.keys("Ctrl-z");
     assert_eq!(desk.effects, [Effect::Suspend]);

@@ -116,8 +116,9 @@ impl Desk {
         self.begun_with.clone()
     }
 
+    /// Returns the scene as the view shows it.
     pub fn scene(&self) -> &Scene {
-        self.model.scene()
+        self.model.seen()
     }
 
     pub fn select(&mut self, subject: Target) {

@@ -61,6 +61,7 @@ pub fn metadata(
         ("Software", format!("zerkalo {}", env!("CARGO_PKG_VERSION"))),
         ("Source", provenance.source.clone()),
         ("Scene hash", provenance.scene_hash.clone()),
+        ("Camera", state.scene().camera.to_inline_table()),
         ("Seed", header.seed.to_string()),
     ];
     let settings = settings_text(sampler, &header.precision, adaptive, &state.display());

@@ -172,7 +172,7 @@ impl Dashboard {
                 // A change of lights alone needs no new picture: the snapshot has one picture per
                 // light group.
                 let snapshot = self.model.snapshot.as_deref();
-                let weights = snapshot.and_then(|s| s.weights_for(self.model.scene()));
+                let weights = snapshot.and_then(|s| s.weights_for(self.model.seen()));
                 if !is_edit || weights.is_none() {
                     awaited = Some(generation);
                 }

@@ -77,7 +77,7 @@ impl UpdateContext<'_> {
 
     /// Opens the aperture by `stops` stops; a negative number closes it.
     pub(super) fn aperture(&mut self, stops: f64) {
-        let edit = edit::change_aperture(self.scene(), stops);
+        let edit = self.edit_lens(|seen| edit::change_aperture(seen, stops));
         self.adjust(edit, Coalesce::Repeat);
     }
 
@@ -95,15 +95,26 @@ impl UpdateContext<'_> {
 
     /// Focuses the lens on the object that is visible at the centre of film pixel `pixel`.
     pub(super) fn focus_on_pixel(&mut self, pixel: [usize; 2]) {
-        match first_hit(self.scene(), pixel) {
+        match first_hit(self.seen(), pixel) {
             Some((_, point)) => self.focus_on(point.to_array()),
             None => self.refuse("There is no object to focus on here."),
         }
     }
 
     fn focus_on(&mut self, point: [f64; 3]) {
-        let edit = edit::focus_on(self.scene(), point);
+        let edit = self.edit_lens(|seen| edit::focus_on(seen, point));
         self.adjust(edit, Coalesce::Single);
+    }
+
+    /// Returns an edit of the lens, which the view shares with the camera of the scene. Distances
+    /// are from the eye of the view.
+    fn edit_lens(
+        &self,
+        edit: impl FnOnce(&Scene) -> Result<Edit, EditError>,
+    ) -> Result<Edit, EditError> {
+        let mut edit = edit(self.seen())?;
+        edit.scene.camera = self.scene().camera.with_lens_of(&edit.scene.camera);
+        Ok(edit)
     }
 }
 

@@ -70,7 +70,9 @@ impl UpdateContext<'_> {
                 self.model.file.is_new = false;
                 self.model.history.mark_saved(scene);
                 self.model.last_edit = None;
-                self.notify(Tone::Good, format!("saved {}", self.model.file.name), Some(3.0));
+                let view = self.model.view.as_ref();
+                let view = view.map_or("", |_| " · the view is not saved: H makes it the camera");
+                self.notify(Tone::Good, format!("saved {}{view}", self.model.file.name), Some(3.0));
                 // The scene may have been edited while it was being saved.
                 let is_unsaved = self.model.is_unsaved();
                 if std::mem::take(&mut self.model.quit_when_saved) && !is_unsaved {

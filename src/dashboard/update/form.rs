@@ -10,8 +10,10 @@ impl UpdateContext<'_> {
         let entries = [edit::object_kinds(), edit::ready_objects()].concat();
         self.open_pick("add an object", entries, 0, |c, name| {
             match edit::object_kinds().iter().any(|kind| kind.name == name) {
-                true => c.open_form(name, edit::add_object(c.scene(), name, None)),
-                false => c.add_ready_made(edit::add_ready_object(c.scene(), name)),
+                true => {
+                    c.open_form(name, c.edit_seen(|seen| edit::add_object(seen, name, None)));
+                }
+                false => c.add_ready_made(c.edit_seen(|seen| edit::add_ready_object(seen, name))),
             }
         });
     }
@@ -20,8 +22,11 @@ impl UpdateContext<'_> {
         let entries = [edit::light_kinds(), edit::ready_lights()].concat();
         self.open_pick("add a light", entries, 0, |c, name| {
             match edit::light_kinds().iter().any(|kind| kind.name == name) {
-                true => c.open_form(&format!("{name} light"), edit::add_light(c.scene(), name)),
-                false => c.add_ready_made(edit::add_ready_light(c.scene(), name)),
+                true => {
+                    let edit = c.edit_seen(|seen| edit::add_light(seen, name));
+                    c.open_form(&format!("{name} light"), edit);
+                }
+                false => c.add_ready_made(c.edit_seen(|seen| edit::add_ready_light(seen, name))),
             }
         });
     }

@@ -154,9 +154,10 @@ impl UpdateContext<'_> {
         self.model.picture_version += 1;
     }
 
-    /// Requests a render of the scene.
+    /// Requests a render of the scene in the present view.
     fn show(&mut self) {
-        let scene = Arc::clone(self.model.scene());
+        self.model.follow_edits();
+        let scene = Arc::clone(self.model.seen());
         self.emit(Effect::Show(scene));
         self.repaint();
     }
@@ -169,6 +170,20 @@ impl UpdateContext<'_> {
 
     fn scene(&self) -> &Arc<Scene> {
         self.model.scene()
+    }
+
+    fn seen(&self) -> &Arc<Scene> {
+        self.model.seen()
+    }
+
+    /// Returns an edit that depends on the view but leaves the camera of the scene as it is.
+    fn edit_seen(
+        &self,
+        edit: impl FnOnce(&Scene) -> Result<Edit, EditError>,
+    ) -> Result<Edit, EditError> {
+        let mut edit = edit(self.seen())?;
+        edit.scene.camera.clone_from(&self.scene().camera);
+        Ok(edit)
     }
 
     /// Records an edit, or shows its error. `coalesce` decides if the edit joins the previous undo

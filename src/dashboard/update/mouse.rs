@@ -184,7 +184,7 @@ impl UpdateContext<'_> {
             if drag.button != Button::Left || drag.modified {
                 return self.focus_on_pixel(pixel);
             }
-            let hit = first_hit(self.scene(), pixel);
+            let hit = first_hit(self.seen(), pixel);
             let seen = hit.map_or(Target::Settings(SceneSettings::Background), |(object, _)| {
                 Target::Object(object)
             });

@@ -19,7 +19,7 @@ impl UpdateContext<'_> {
     /// Returns the coordinate axes in the ground plane that point most nearly to the right and away
     /// from the eye. Moves along coordinate axes keep round coordinates round.
     fn ground_axes(&self) -> [DVec3; 2] {
-        let [right, _, _] = self.scene().camera.frame();
+        let [right, _, _] = self.seen().camera.frame();
         let right = nearest_axis(right);
         // The cross product points away from an upright observer.
         [right, DVec3::Y.cross(right)]
@@ -46,7 +46,7 @@ impl UpdateContext<'_> {
     /// Moves the selection by a drag in half cells, vertically if `upright` is `true`, otherwise in
     /// the ground plane. The selection stays under the mouse as far as [`MOST_STRETCH`] allows.
     pub(super) fn move_by_hand(&mut self, right: f64, down: f64, upright: bool) {
-        let scene = self.scene();
+        let scene = self.seen();
         let [x, _, forward] = scene.camera.frame();
         let eye = DVec3::from_array(scene.camera.eye);
         let distance = match bounds(scene, &self.model.selection) {

@@ -112,7 +112,8 @@ impl UpdateContext<'_> {
     }
 
     fn store_view(&mut self, text: &str) -> Result<(), String> {
-        let edit = edit::store_view(self.scene(), Some(text)).map_err(|e| e.to_string())?;
+        let edit = self.edit_seen(|seen| edit::store_view(seen, Some(text)));
+        let edit = edit.map_err(|e| e.to_string())?;
         self.record(edit, Coalesce::Single);
         let number =
             self.scene().cameras.keys().position(|name| name == text).map_or(0, |index| index + 1);
@@ -133,7 +134,7 @@ impl UpdateContext<'_> {
         if let Some(more) = words.next() {
             return Err(format!("Unexpected \"{}\".", truncated(more)));
         }
-        let film = edit::set(self.scene(), &Target::Settings(SceneSettings::Film), "size", size);
+        let film = edit::set(self.seen(), &Target::Settings(SceneSettings::Film), "size", size);
         let scene = film.map_err(|error| error.to_string())?.scene;
         let size = scene.film.size;
         self.model.export = Some(RunningExport { size, progress: 0.0, left: None });

@@ -81,7 +81,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn checkpoint(&mut self) {
-        let scene = Arc::clone(self.model.scene());
+        let scene = Arc::clone(self.model.seen());
         self.emit(Effect::Checkpoint(scene));
         self.say("writing a checkpoint …");
     }

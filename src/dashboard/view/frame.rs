@@ -1,6 +1,6 @@
 //! Border of the picture's panel, with file name, mode and settings of the display.
 
-use crate::dashboard::text::{cut, number};
+use crate::dashboard::text::{columns, cut, number};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::painter::Painter;
@@ -21,6 +21,8 @@ pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &m
     for (text, loud) in chips(model).iter().rev() {
         let style = if *loud { theme.warn() } else { theme.dim() };
         // At least 12 columns remain for the file name.
+        let fits = columns(text) + 15 <= row.left();
+        let text = if fits { text } else { text.split(" · ").next().unwrap_or(text) };
         row.put_right(&format!(" {text} "), 13, style);
         row.put_right("─", 12, theme.border(focused));
     }
@@ -71,6 +73,9 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
     }
     if model.display.tone != Tone::Clip {
         chips.push((model.display.tone.name().to_string(), false));
+    }
+    if model.view.is_some() {
+        chips.push(("view, not the camera · H keeps it, h leaves it".to_string(), true));
     }
     chips
 }

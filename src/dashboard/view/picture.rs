@@ -147,7 +147,7 @@ fn round_up(value: f64) -> f64 {
 /// Returns the latest picture, with the present weights of the light groups.
 fn beauty(model: &Model, snapshot: &Snapshot, size: [usize; 2]) -> Option<Raster> {
     let picture = snapshot.picture.as_ref()?;
-    let newest = snapshot.weights_for(model.scene());
+    let newest = snapshot.weights_for(model.seen());
     let radiance = picture.mixed(newest.as_ref().unwrap_or(&snapshot.weights));
     let live = displayed(&radiance, &model.display, [picture.cols, picture.rows]);
     Some(resized(live, size))

@@ -54,6 +54,9 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         let text = format!("writing {width}×{height}  {:.0} %{left}", 100.0 * export.progress);
         parts.push(part(0, vec![(text, theme.accent())]));
     }
+    if model.fullscreen && model.view.is_some() {
+        parts.push(part(1, vec![("view, not the camera".to_string(), theme.warn())]));
+    }
     let watching = model.watch.is_some();
     if let Some(table) = &model.watch {
         let summary = watch::summary(&table.report, theme).into_iter().enumerate();

@@ -9,8 +9,10 @@ mod perspective;
 pub use lens::{Aperture, Focus};
 pub use perspective::{PerspectiveCamera, ThinLens};
 
+use crate::TomlText;
 use crate::value::{Description, Field, KeyNode, ValidationError, description, one_of, unit};
 use glam::DVec3;
+use toml::Value;
 
 description! {
     /// Perspective camera: a pinhole, or a thin lens with a plane in focus.
@@ -71,6 +73,11 @@ impl Camera {
             _ => return None,
         };
         unit(look)
+    }
+
+    /// Formats the camera as the value of the key `camera` in a scene file, in one line.
+    pub fn to_inline_table(&self) -> String {
+        Value::Table(self.to_table()).to_string()
     }
 
     /// Returns the validation errors.

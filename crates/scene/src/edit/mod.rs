@@ -38,7 +38,7 @@ pub use rotate::rotate;
 pub use set::{set, set_component};
 pub use target::{SceneSettings, Section, Target, outline};
 pub use translate::move_by;
-pub use viewpoints::{recall_view, store_view};
+pub use viewpoints::store_view;
 
 use crate::Scene;
 use crate::value::truncated;

@@ -1,4 +1,4 @@
-//! Edits that store the current camera and recall stored cameras.
+//! Edit that stores the current camera.
 
 use crate::Scene;
 use crate::edit::parse_value::name;
@@ -23,21 +23,13 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
     Ok(Edit::checked(next, Target::View(name), label)?.with_note(note))
 }
 
-/// Makes the stored camera `name` the current camera.
-pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
-    let target = Target::View(name.to_string());
-    let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&target))?;
-    let next = Scene { camera: view.clone(), ..scene.clone() };
-    Edit::checked(next, Target::Camera, format!("recall camera {}", target.label(scene)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::mirror_room;
 
     #[test]
-    fn cameras_are_stored_and_recalled() {
+    fn cameras_are_stored() {
         let scene = mirror_room();
         let edit = store_view(&scene, None).unwrap();
         assert_eq!(edit.target, Target::View("view".into()));
@@ -45,11 +37,9 @@ mod tests {
         assert_eq!(edit.target, Target::View("view 2".into()));
         let mut moved = edit.scene;
         moved.camera.eye = [3.0, 2.0, 1.0];
-        let back = recall_view(&moved, "view").unwrap();
-        assert_eq!((back.scene.camera, back.target), (scene.camera.clone(), Target::Camera));
         let edit = store_view(&moved, Some(" view ")).unwrap();
         assert_eq!(edit.scene.cameras["view"], moved.camera);
         assert!(edit.note.is_some());
-        assert!(recall_view(&scene, "view").is_err() && store_view(&scene, Some(" ")).is_err());
+        assert!(store_view(&scene, Some(" ")).is_err());
     }
 }
