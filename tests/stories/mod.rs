@@ -11,6 +11,7 @@ mod roughness;
 mod simulated_dashboard;
 mod table;
 mod watch;
+mod zoom;
 
 use crate::harness::*;
 use simulated_dashboard::{Desk, FILE, ROOM};

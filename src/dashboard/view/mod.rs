@@ -5,6 +5,7 @@ mod fields;
 mod frame;
 mod image_viewer;
 mod legend;
+mod loupe;
 mod message_view;
 mod outline;
 mod overlay;
@@ -50,7 +51,7 @@ impl View {
         let version = (model.picture_version, layout.raster, model.colors);
         if self.made_for != Some(version) {
             let settled = picture::is_settled(model);
-            let raster = self.imager.raster(model, layout.raster).unwrap_or_default();
+            let raster = self.imager.raster(model, layout).unwrap_or_default();
             self.picture = picture_cells(&raster, model.colors, settled);
             self.made_for = Some(version);
         }
@@ -74,11 +75,13 @@ impl View {
             return None;
         };
         self.picture(model, &layout);
+        let mut magnified = None;
         frame::draw(model, &layout, self.imager.legend.as_ref(), painter);
         if model.file.unreadable {
             message_view::broken(model, &layout, painter);
         } else {
             picture::paint(&self.picture, layout.image, painter.buffer);
+            magnified = loupe::draw(model, &layout, painter);
             message_view::failure(model, &layout, painter);
             pixel_probe::draw(model, &layout, painter);
         }
@@ -100,6 +103,9 @@ impl View {
         if !model.file.unreadable {
             (self.place, self.uncovered) =
                 picture::visible_mask(&self.picture, layout.image, painter.buffer);
+            if let Some(cells) = &magnified {
+                loupe::uncover(cells, painter.buffer, self.place, &mut self.uncovered);
+            }
         }
         cursor
     }
