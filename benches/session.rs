@@ -45,7 +45,7 @@ fn figures(size: [u32; 2]) {
         stop: Stop::default(),
     };
     let mut session = Session::new(threads, options, settings).unwrap();
-    session.set_view(View { raster: Some(RASTER), probe: Some([9, 9]) });
+    session.set_view(View { raster: Some(RASTER), probe: Some([9, 9]), ..View::default() });
     let text = include_str!("../scenes/mirror-room.toml");
     let mut scene = Scene::parse(text, "mirror-room.toml").unwrap();
     scene.film.size = size;

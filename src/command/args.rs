@@ -11,6 +11,7 @@ use zerkalo_render::image_file::Depth;
 use zerkalo_render::plan::MAX_SHARDS;
 use zerkalo_scene::{Acceleration, Scene};
 use zerkalo_terminal::Environment;
+use zerkalo_terminal::image::GraphicsMode;
 use zerkalo_world::Precision;
 
 /// A progressive, accumulating ray tracer that lives in a terminal.
@@ -51,6 +52,9 @@ pub struct TerminalArgs {
     /// terminal's replies
     #[arg(long, value_parser = choice(COLORS), default_value = "auto")]
     color: ColorChoice,
+    /// Protocol that shows the picture; auto: the best one that is known to work in the terminal
+    #[arg(long, value_parser = choice(GRAPHICS), default_value = "auto")]
+    graphics: GraphicsMode,
     /// Kilobytes per second sent to the terminal [default: over SSH the measured rate of the
     /// connection; else unlimited]
     #[arg(long, value_name = "KB", value_parser = bandwidth, allow_negative_numbers = true)]
@@ -328,6 +332,13 @@ const COLORS: [Choice<ColorChoice>; 5] = [
     ("none", Some("No colours"), Some(Colors::Mono)),
 ];
 
+const GRAPHICS: [Choice<GraphicsMode>; 4] = [
+    ("auto", None, GraphicsMode::Automatic),
+    ("kitty", Some("Kitty's graphics protocol"), GraphicsMode::Kitty),
+    ("sixel", Some("Sixel"), GraphicsMode::Sixel),
+    ("cells", Some("Half blocks in cells of the terminal"), GraphicsMode::Cells),
+];
+
 const DEPTHS: [Choice<Depth>; 2] = [("8", None, Depth::Eight), ("16", None, Depth::Sixteen)];
 
 const SAMPLERS: [Choice<SamplerKind>; 2] = [
@@ -348,7 +359,7 @@ fn max_threads() -> usize {
 impl TerminalArgs {
     pub fn setup(&self, environment: Environment) -> TerminalSetup {
         let bandwidth = self.bandwidth.map(|kilobytes| 1e3 * kilobytes);
-        TerminalSetup { colors: self.color, environment, bandwidth }
+        TerminalSetup { colors: self.color, environment, graphics: self.graphics, bandwidth }
     }
 }
 

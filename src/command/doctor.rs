@@ -3,13 +3,14 @@
 
 use crate::command::edit::obstacle;
 use crate::command::{Failure, print_line};
+use crate::dashboard::graphics::Graphics;
 use crate::dashboard::run::{Colors, TerminalReport, diagnose};
 use crate::dashboard::text::wrapped;
 use std::env;
 use std::time::Duration;
 use zerkalo_scene::value::sanitized;
 use zerkalo_terminal::flow::PacingMode;
-use zerkalo_terminal::image::Protocol;
+use zerkalo_terminal::image::{GraphicsMode, Protocol};
 use zerkalo_terminal::{Capabilities, Environment, Multiplexer};
 
 /// Width of the report in columns.
@@ -56,6 +57,8 @@ impl DoctorReport {
             lines.push(row("size", &size(*cells, terminal.cell_px)));
             lines.push(row("whole frames", whole_frames(terminal)));
             lines.push(row("still pictures", &stills(terminal)));
+            let live = Graphics::new(terminal.clone(), GraphicsMode::Automatic);
+            lines.push(row("live picture", &live.description()));
             lines.push(row("acknowledgement", acknowledgement(*mode)));
             lines.push(row("round trip", &round_trip(terminal)));
         }

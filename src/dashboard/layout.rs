@@ -2,6 +2,7 @@
 
 use crate::dashboard::Model;
 use ratatui::layout::{Margin, Rect};
+use zerkalo_render::film::Window;
 
 /// Panel that can have the focus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -25,6 +26,11 @@ pub struct Layout {
     /// terminal cell, and is treated as square. If the number of rows is odd, the last row consists
     /// of upper halves.
     pub raster: [usize; 2],
+    /// Window of the film that the picture shows.
+    pub window: Window,
+    /// Pixels of the screen that show the picture if the terminal shows images and if pixels show
+    /// more of the film than cells.
+    pub pixels: Option<PixelGrid>,
     /// Area of the outline, or of the table of watched files.
     pub outline: Option<Rect>,
     pub inspector: Option<Rect>,
@@ -32,6 +38,28 @@ pub struct Layout {
     pub status: Rect,
     /// Row of key hints and notices.
     pub hints: Rect,
+}
+
+/// Picture in pixels of the screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelGrid {
+    /// Cells that the picture covers, at least in part.
+    pub place: Rect,
+    /// Width and height of the picture in pixels.
+    pub size: [usize; 2],
+    /// Width and height of a cell in pixels.
+    pub cell: [usize; 2],
+    /// Window of the film that the pixels show.
+    pub window: Window,
+}
+
+/// Zoom of the film in its panel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Zoom {
+    /// Binary logarithm of the number of half cells across a film pixel.
+    pub steps: i32,
+    /// Column and row of the film, in pixels, at the centre of the panel.
+    pub center: [f64; 2],
 }
 
 pub const BORDER: Margin = Margin { horizontal: 1, vertical: 1 };
@@ -66,13 +94,46 @@ impl Model {
             side = 0;
         }
         let picture = Rect { x: 0, y: 0, width: width - side, height: rows };
-        let inside = if self.fullscreen { picture } else { picture.inner(BORDER) };
-        let (image, raster) = fitted(inside, self.scene().film.size);
+        let inside = self.inside(picture);
+        let film = self.scene().film.size;
+        let (raster, window) = match self.zoom {
+            Some(zoom) => zoom.window(inside, film),
+            None => (fitted(inside, film), Window::whole(film.map(|n| n as usize))),
+        };
+        let image = centred(inside, raster);
+        let cells = PictureCells { image, raster, window, pixels: None };
+        let PictureCells { image, raster, window, pixels } = match self.graphics.cell_px() {
+            Some(cell) => cells.with_pixels(inside, self.zoom.is_none(), cell),
+            None => cells,
+        };
         let [outline, inspector, plot] = match side {
             0 => [None; 3],
             _ => self.side_panels(Rect { x: width - side, y: 0, width: side, height: rows }),
         };
-        Some(Layout { picture, image, raster, outline, inspector, plot, status, hints })
+        Some(Layout {
+            picture,
+            image,
+            raster,
+            window,
+            pixels,
+            outline,
+            inspector,
+            plot,
+            status,
+            hints,
+        })
+    }
+
+    /// Returns the number of half cells across a film pixel if the whole film is visible.
+    pub fn fitting_scale(&self) -> f64 {
+        let film = self.scene().film.size;
+        let inside = self.layout().map(|layout| self.inside(layout.picture));
+        inside.map_or(1.0, |inside| fitted(inside, film)[0] as f64 / f64::from(film[0].max(1)))
+    }
+
+    /// Returns the room for the picture's cells in its panel.
+    fn inside(&self, panel: Rect) -> Rect {
+        if self.fullscreen { panel } else { panel.inner(BORDER) }
     }
 
     /// Divides the side column into outline, inspector and plot, from top to bottom. In `zerkalo
@@ -95,38 +156,110 @@ impl Model {
     }
 }
 
-/// Returns the largest area with the film's aspect ratio in `inside`, centred there, and its number
-/// of columns and rows of half cells.
-fn fitted(inside: Rect, [film_width, film_height]: [u32; 2]) -> (Rect, [usize; 2]) {
+/// Returns the columns and rows of half cells of the largest area with the film's aspect ratio in
+/// `inside`.
+fn fitted(inside: Rect, [film_width, film_height]: [u32; 2]) -> [usize; 2] {
     let (columns, halves) = (f64::from(inside.width), 2.0 * f64::from(inside.height));
     let (film_width, film_height) = (f64::from(film_width.max(1)), f64::from(film_height.max(1)));
     let per_pixel = (columns / film_width).min(halves / film_height);
     let whole = |pixels: f64, most: f64| (pixels * per_pixel).round().clamp(1.0, most.max(1.0));
-    let raster = [whole(film_width, columns), whole(film_height, halves)];
-    let [width, height] = [raster[0] as u16, (raster[1] / 2.0).ceil() as u16];
-    let image = Rect {
-        x: inside.x + (inside.width - width.min(inside.width)) / 2,
-        y: inside.y + (inside.height - height.min(inside.height)) / 2,
+    [whole(film_width, columns), whole(film_height, halves)].map(|n| n as usize)
+}
+
+/// Returns the cells of a picture of `raster` half cells, at the centre of `inside`.
+fn centred(inside: Rect, [columns, halves]: [usize; 2]) -> Rect {
+    let (width, height) = (columns as u16, halves.div_ceil(2) as u16);
+    Rect {
+        x: inside.x + inside.width.saturating_sub(width) / 2,
+        y: inside.y + inside.height.saturating_sub(height) / 2,
         width,
         height,
-    };
-    (image, raster.map(|n| n as usize))
+    }
+}
+
+/// Cells and pixels of the picture, as in [`Layout`].
+struct PictureCells {
+    image: Rect,
+    raster: [usize; 2],
+    window: Window,
+    pixels: Option<PixelGrid>,
+}
+
+impl PictureCells {
+    /// Adds the pixels of the picture, unless cells show each pixel of the film. A pixel of a film
+    /// that fits into `inside` is a square of whole pixels of the screen. The cells then show the
+    /// part of the film that covers them exactly.
+    fn with_pixels(self, inside: Rect, is_whole: bool, cell: [usize; 2]) -> Self {
+        let Self { image, raster, window, .. } = self;
+        if raster[0] >= window.size[0] {
+            return self;
+        }
+        let room = [usize::from(inside.width) * cell[0], usize::from(inside.height) * cell[1]];
+        let times = (room[0] / window.size[0]).min(room[1] / window.size[1]);
+        if !is_whole || times == 0 {
+            let size = [usize::from(image.width) * cell[0], raster[1] * cell[1] / 2];
+            let grid = PixelGrid { place: image, size, cell, window };
+            return Self { pixels: Some(grid), ..self };
+        }
+        let size = window.size.map(|n| n * times);
+        let [width, height] = [0, 1].map(|i| size[i].div_ceil(cell[i]));
+        let place = centred(inside, [width, 2 * height]);
+        let cells = [0, 1].map(|i| (size[i] / cell[i]).max(1));
+        let image = Rect { width: cells[0] as u16, height: cells[1] as u16, ..place };
+        let shown = [0, 1].map(|i| (cells[i] * cell[i] / times).clamp(1, window.size[i]));
+        Self {
+            image,
+            raster: [cells[0], 2 * cells[1]],
+            window: Window { size: shown, ..window },
+            pixels: Some(PixelGrid { place, size, cell, window }),
+        }
+    }
+}
+
+impl Zoom {
+    /// Returns columns and rows of half cells in `inside`, and the window of the film that they
+    /// show.
+    fn window(&self, inside: Rect, film: [u32; 2]) -> ([usize; 2], Window) {
+        let scale = f64::from(self.steps).exp2();
+        let room = [usize::from(inside.width), 2 * usize::from(inside.height)];
+        let film = film.map(|n| n as usize);
+        let size = [0, 1].map(|i| ((room[i] as f64 / scale) as usize).clamp(1, film[i].max(1)));
+        let halves =
+            |i: usize| ((size[i] as f64 * scale).round() as usize).clamp(1, room[i].max(1));
+        let origin = [0, 1].map(|i| {
+            let start = (self.center[i] - 0.5 * size[i] as f64).round().max(0.0) as usize;
+            start.min(film[i].saturating_sub(size[i]))
+        });
+        ([halves(0), halves(1)], Window { origin, size })
+    }
 }
 
 impl Layout {
     /// Returns the pixel of the film (column, row) that the cell at `column` and `row` of the
     /// screen shows at its centre. Returns `None` outside the picture.
-    pub fn film_pixel(&self, film: [u32; 2], column: u16, row: u16) -> Option<[usize; 2]> {
+    pub fn film_pixel(&self, column: u16, row: u16) -> Option<[usize; 2]> {
         if !self.image.contains((column, row).into()) {
             return None;
         }
         let at =
             [f64::from(column - self.image.x) + 0.5, 2.0 * f64::from(row - self.image.y) + 1.0];
+        let Window { origin, size } = self.window;
         let pixel = |i: usize| {
-            let pixel = at[i] / self.raster[i] as f64 * f64::from(film[i]);
-            (pixel as usize).min(film[i].saturating_sub(1) as usize)
+            let pixel = at[i] / self.raster[i] as f64 * size[i] as f64;
+            origin[i] + (pixel as usize).min(size[i].saturating_sub(1))
         };
         Some([pixel(0), pixel(1)])
+    }
+
+    /// Returns the cell (column, row) that shows a point of the film in pixels. Returns `None`
+    /// outside the window.
+    pub fn cell_of(&self, point: [f64; 2]) -> Option<[u16; 2]> {
+        let Window { origin, size } = self.window;
+        let half = |i: usize| {
+            let share = (point[i] - origin[i] as f64) / size[i] as f64;
+            (0.0..1.0).contains(&share).then(|| (share * self.raster[i] as f64) as u16)
+        };
+        Some([self.image.x + half(0)?, self.image.y + half(1)? / 2])
     }
 }
 
@@ -202,10 +335,11 @@ mod tests {
                     for row in image.y..image.y + image.height {
                         for column in image.x..image.x + image.width {
                             assert!(inside.contains((column, row).into()));
-                            assert!(l.film_pixel(film, column, row).is_some());
+                            let pixel = l.film_pixel(column, row).unwrap();
+                            assert!(l.window.contains(pixel));
                         }
                     }
-                    assert_eq!(l.film_pixel(film, image.x + image.width, image.y), None);
+                    assert_eq!(l.film_pixel(image.x + image.width, image.y), None);
                 }
             }
         }

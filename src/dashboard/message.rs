@@ -8,6 +8,7 @@ use zerkalo_render::film::{Display, LinearImage};
 use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{Snapshot, View, WatchReport};
 use zerkalo_scene::{SaveError, Scene, SceneErrors};
+use zerkalo_terminal::Capabilities;
 use zerkalo_terminal::event::{Key, Mouse};
 use zerkalo_terminal::image::ViewerImage;
 
@@ -55,6 +56,8 @@ pub enum Message {
     ImageSent(f64),
     /// Measured or fixed rate of output in bytes per second; `None` for a local terminal.
     ConnectionRate(Option<f64>),
+    /// New capabilities of the terminal, which include the size of its cells.
+    Terminal(Box<Capabilities>),
     /// Time has passed, so that the notice disappears.
     Tick,
 }

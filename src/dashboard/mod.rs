@@ -9,9 +9,11 @@
 
 pub mod convergence;
 pub mod editor;
+pub mod graphics;
 pub mod hints;
 pub mod key_context;
 pub mod layout;
+pub mod loupe;
 pub mod message;
 pub mod model;
 pub mod noise_targets;

@@ -1,5 +1,8 @@
 //! Model: the complete state of the dashboard, from which the screen is drawn.
 
+use crate::dashboard::graphics::Graphics;
+use crate::dashboard::layout::Zoom;
+use crate::dashboard::loupe::Loupe;
 use crate::dashboard::{
     Convergence, DisplayChannel, Editor, Focus, Format, KeyContext, ListCursor, OrphanedEdits,
     Overlay, SceneSource,
@@ -9,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use zerkalo_render::film::{Display, LinearImage, PixelProbe};
 use zerkalo_render::schedule::{Interval, Stop};
-use zerkalo_render::session::{Snapshot, WatchReport};
+use zerkalo_render::session::{Snapshot, View, WatchReport};
 use zerkalo_scene::camera::Camera;
 use zerkalo_scene::edit::Target;
 use zerkalo_scene::value::sanitized;
@@ -197,8 +200,12 @@ pub struct Model {
     pub orphaned_edits: Option<OrphanedEdits>,
     /// Scene of the last autosave; `None` if there were no unsaved edits at that time.
     pub autosaved: Option<Arc<Scene>>,
-    /// Last requested size of pictures: columns and rows of half cells.
-    pub raster: Option<[usize; 2]>,
+    /// Last requested parts of snapshots.
+    pub requested: View,
+    /// Zoom of the film in its panel; `None` if the whole film is visible.
+    pub zoom: Option<Zoom>,
+    pub loupe: Loupe,
+    pub graphics: Graphics,
     /// Counter that increases whenever the picture's cells may have become outdated.
     pub picture_version: u64,
     /// Table of watched film files; `None` except in `zerkalo watch`.

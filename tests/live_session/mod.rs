@@ -6,7 +6,7 @@ mod noise;
 
 use crate::harness::*;
 use std::sync::mpsc::channel;
-use zerkalo_render::film::LinearImage;
+use zerkalo_render::film::{LinearImage, Window};
 use zerkalo_render::session::{Snapshot, View};
 
 const SCENE: &str = r#"
@@ -112,7 +112,7 @@ fn relit_picture_equals_fresh_render() {
 #[test]
 fn light_changes_keep_samples() {
     let mut session = session(spp_stop(64), true);
-    session.set_view(View { raster: Some([10, 7]), probe: None });
+    session.set_view(View { raster: Some([10, 7]), ..View::default() });
     let before = finish(&mut session, &scene());
     let newer = relit();
     let mix = before.weights_for(&newer).expect("the film serves the scene");
@@ -242,7 +242,7 @@ fn submitted_tasks_always_run_without_waiting() {
         assert_eq!(answers.recv_timeout(PATIENCE).unwrap(), Some(generation));
     }
     // The picture of the snapshot and the probed pixel must agree with the film of the same moment.
-    session.set_view(View { raster: Some([20, 14]), probe: Some([50, 40]) });
+    session.set_view(View { raster: Some([20, 14]), probe: Some([50, 40]), ..View::default() });
     session.set_stop(spp_stop(16));
     let end = resting(&session, generation);
     let (keep, kept) = channel();
@@ -252,7 +252,11 @@ fn submitted_tasks_always_run_without_waiting() {
         keep.send(kept).unwrap();
     });
     let (kept, pixel) = kept.recv_timeout(PATIENCE).unwrap().unwrap();
-    for (a, b) in end.picture.unwrap().mixed(&end.weights).iter().zip(kept.resampled(20, 14)) {
+    for (a, b) in end.picture.unwrap().mixed(&end.weights).iter().zip(kept.resampled(
+        Window::whole(kept.size),
+        20,
+        14,
+    )) {
         (0..3).for_each(|c| assert!((a[c] - b[c]).abs() < 1e-5, "{a:?} {b:?}"));
     }
     let probe = end.probe.unwrap();
@@ -290,7 +294,7 @@ fn snapshot_picture_features_and_generation_match() {
         }
         for session in [&mut a, &mut b] {
             let raster = Some([5 + number as usize % 3, 4]);
-            session.set_view(View { raster, probe: None });
+            session.set_view(View { raster, ..View::default() });
             assert_eq!(session.set_scene(Arc::new(wall(number))), number);
         }
         std::thread::sleep(Duration::from_micros(number * 97 % 4000));
@@ -319,7 +323,7 @@ fn snapshot_picture_features_and_generation_match() {
 fn finished_or_paused_session_stays_asleep() {
     let mut session = session(spp_stop(8), true);
     let generation = session.set_scene(Arc::new(scene()));
-    session.set_view(View { raster: Some([8, 8]), probe: None });
+    session.set_view(View { raster: Some([8, 8]), ..View::default() });
     resting(&session, generation);
     let idle_switches = switches_in(&session);
     session.set_stop(Stop::default());

@@ -20,7 +20,7 @@ const COLORS: RequestReply = (b"\x1b[?1;1;0S", "\x1b[?1;0;256S");
 const REMOVAL: &str = "\x1b_Gm=0,q=2;\x1b\\\x1b_Ga=d,d=I,i=163,q=2\x1b\\";
 
 fn with_picture(fixture: &Fixture, args: &[&str], replies: &[RequestReply]) -> (Terminal, Picture) {
-    let command = [&[PROGRAM, "room.toml"], args].concat();
+    let command = [&[PROGRAM, "room.toml", "--graphics", "cells"], args].concat();
     let start =
         Start { command: &command, folder: fixture.0.path(), size: SIZE, env: &[], replies: true };
     let mut terminal = Terminal::start_with(&start, replies);

@@ -311,6 +311,13 @@ fn picture_stories() -> Vec<Story> {
             d.model.channel == DisplayChannel::Noise
         }),
         story("view before", "V", |_, d| d.model.channel == DisplayChannel::Depth),
+        story("zoom in", "Z", |_, d| d.model.zoom.is_some_and(|zoom| zoom.steps == 1)),
+        story("zoom out", "Z Z X", |_, d| d.model.zoom.is_some_and(|zoom| zoom.steps == 1)),
+        story("zoom fits: the whole picture", "Z Alt-0", |_, d| d.model.zoom.is_none()),
+        story("loupe: automatic, always, never", "G", |_, d| d.notice() == "loupe: always"),
+        story("next graphics protocol of the picture", "Alt-#", |_, d| {
+            d.notice().starts_with("graphics auto: cells")
+        }),
         story("probe a pixel", "i", |_, d| {
             d.asked(|e| matches!(e, Effect::View(view) if view.probe == Some([32, 24])))
                 && d.model.mode == Mode::Probe

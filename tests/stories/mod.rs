@@ -13,6 +13,7 @@ mod simulated_dashboard;
 mod table;
 mod view;
 mod watch;
+mod zoom;
 
 use crate::harness::*;
 use simulated_dashboard::{Desk, FILE, ROOM};

@@ -3,6 +3,7 @@
 
 use super::*;
 use zerkalo_render::FirstHitBuffer;
+use zerkalo_render::film::Window;
 
 const SIZE: [u32; 2] = [96, 72];
 const SAMPLES: u32 = 16;
@@ -57,7 +58,7 @@ fn roughness_changes_only_pixels_of_the_mirror() {
     let [width, height] = SIZE.map(|n| n as usize);
     let size = [width, height];
     let look = |points: &[[f64; 2]], seen: &mut [FirstHit]| before.world.first_hit(points, seen);
-    let seen = FirstHitBuffer::new(size, size, look, &pool(2));
+    let seen = FirstHitBuffer::new(Window::whole(size), size, look, &pool(2));
     let mirror = smooth.objects.iter().position(|o| o.name == "mirror").unwrap() as u32;
     let others = changed(&before, &marked(&smooth, |name| name != "mirror"));
     let shows = |i: &usize| seen.texels[*i].object == Some(mirror) && others[*i];

@@ -78,7 +78,9 @@ const MOUSE: &[(&str, &str)] = &[
     ("drag in the picture", "orbits; while moving: moves the selection in the ground plane"),
     ("drag with the right button, or with Ctrl or Alt", "pans; while moving: moves it up and down"),
     ("click with the right button, or with Ctrl or Alt", "focuses the lens on the visible point"),
+    ("drag in the picture while zoomed", "pans the picture; the camera stays"),
     ("wheel over the picture", "dollies"),
+    ("wheel with Ctrl or Alt, or over the loupe", "zooms the picture"),
     ("click in a panel or list", "selects; a second time: opens"),
     ("wheel over the field under the cursor", "steps its value; elsewhere: scrolls"),
 ];

@@ -138,6 +138,8 @@ impl Dashboard {
                 // A terminal behind a multiplexer may reply only after the capability query has
                 // ended.
                 self.frames.terminal.learn(&reply);
+                let terminal = Box::new(self.frames.terminal.clone());
+                self.dispatch(Message::Terminal(terminal));
                 return;
             }
             Event::Reply(_) => return,
@@ -187,7 +189,7 @@ impl Dashboard {
 
     fn take_snapshot(&mut self, snapshot: Snapshot) {
         let failed = matches!(snapshot.report.state, State::Failed(_));
-        let raster = |s: &Snapshot| s.picture.as_ref().map(|p| [p.cols, p.rows]);
+        let raster = |s: &Snapshot| s.picture.as_ref().map(|p| ([p.cols, p.rows], s.window));
         if snapshot.picture.is_some() || failed {
             let old = self.model.snapshot.as_deref().and_then(raster);
             let is_new_scene = self.shown != snapshot.report.generation;
@@ -238,7 +240,10 @@ impl Dashboard {
                 let drawn = self.frames.draw(&self.model, now, request, self.image_epoch);
                 self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
                 match drawn {
-                    DrawOutcome::Nothing | DrawOutcome::Deferred | DrawOutcome::Slice => {}
+                    DrawOutcome::Nothing
+                    | DrawOutcome::Deferred
+                    | DrawOutcome::Slice
+                    | DrawOutcome::Tiles => {}
                     DrawOutcome::Same => {
                         // The screen already shows the response, so the latency ends now.
                         self.latency.sent(self.shown);

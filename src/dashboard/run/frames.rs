@@ -2,6 +2,7 @@
 
 use crate::dashboard::run::exports::image_upload::ImageUpload;
 use crate::dashboard::run::exports::paths;
+use crate::dashboard::run::tiles::PanelTiles;
 use crate::dashboard::run::writer::{self, Writer};
 use crate::dashboard::view::{View, is_settled};
 use crate::dashboard::{Model, Overlay};
@@ -10,13 +11,15 @@ use ratatui::layout::{Position, Rect};
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo_terminal::diff::{FrameDiff, TargetFrame};
+use zerkalo_terminal::diff::{Frame, FrameDiff, TargetFrame};
 use zerkalo_terminal::flow::{FlowControl, FrameBudget, InitialLink, TcpSendQueue};
 use zerkalo_terminal::{Capabilities, Multiplexer, Tty, copied, hyperlink};
 
 /// Start and end of a synchronised update, which the terminal displays as a whole.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 
+/// Largest number of bytes of tiles in a frame, even if the connection has no limit.
+const TILE_BYTES: usize = 1 << 16;
 /// Upper bound of the length of an acknowledgement request, which has 14 bytes inside tmux.
 const ACK_REQUEST_BYTES: usize = 16;
 
@@ -43,7 +46,9 @@ pub struct FramePipeline {
     tty: Arc<Tty>,
     /// Upload of the viewed image.
     pub upload: Option<ImageUpload>,
-    /// Escape sequence that removes the previously viewed image, to be sent before the next frame.
+    /// Tiles of the picture in its panel.
+    tiles: PanelTiles,
+    /// Escape sequence that removes images, to be sent before the next frame.
     removal: Vec<u8>,
     /// `true` if the frame that is being written removes an image.
     removing: bool,
@@ -69,6 +74,8 @@ pub enum DrawOutcome {
     Same,
     /// A part of a viewed image was sent instead of a frame.
     Slice,
+    /// Parts of the picture's tiles were sent instead of a frame.
+    Tiles,
     /// A frame without picture cells was sent.
     Text,
     /// A frame with picture cells was sent.
@@ -93,6 +100,7 @@ impl FramePipeline {
             link: [None, None],
             tty,
             upload: None,
+            tiles: PanelTiles::default(),
             removal: Vec::new(),
             removing: false,
         })
@@ -105,6 +113,7 @@ impl FramePipeline {
     /// Treats the contents of the terminal as unknown: the next frame redraws the whole screen.
     pub fn forget(&mut self) {
         self.diff = FrameDiff::default();
+        self.removal.extend(self.tiles.clear().as_bytes());
         self.give_up();
     }
 
@@ -181,6 +190,9 @@ impl FramePipeline {
             let slice = || if may() { now } else { self.flow.wakes_at(now, false) };
             return upload.is_unfinished().then(slice);
         }
+        if self.tiles.is_open() || self.tiles.waits() && !text && !pending.visible {
+            return Some(if may() { now } else { self.flow.wakes_at(now, false) });
+        }
         if !text && !pending.visible {
             let hidden = pending.hidden?.max(self.flow.refine_at);
             return Some(if may() { hidden } else { hidden.max(self.flow.wakes_at(now, false)) });
@@ -211,25 +223,21 @@ impl FramePipeline {
             // No picture cells are sent while the viewed image covers them or is about to.
             budget.picture &= !upload.follows(true);
         }
+        if self.tiles.is_open() {
+            return self.send_tiles(model, now, whole, image_epoch);
+        }
         if request.changed {
             self.redraw(model);
         }
-        let target = TargetFrame {
-            cells: &self.target,
-            cursor: self.cursor,
-            picture: self.view.place,
-            uncovered: &self.view.uncovered,
-            subject: image_epoch,
-            version: model.picture_version,
-            samples: model.snapshot.as_ref().map_or(0.0, |s| s.report.spp.mean),
-            settled: is_settled(model),
-        };
+        if self.tiles.waits() {
+            budget.refinement = 0;
+        }
         let mut bytes = self.removal.clone();
         if self.terminal.synchronised {
             bytes.extend(SYNCHRONISED[0]);
         }
         let empty = bytes.len();
-        let frame = self.diff.frame(&target, now, budget, self.flow.threshold(), &mut bytes);
+        let frame = self.encode(model, now, budget, image_epoch, &mut bytes);
         if let Some(upload) = &mut self.upload {
             upload.seen |= frame.picture;
         }
@@ -239,6 +247,9 @@ impl FramePipeline {
                 |upload: &ImageUpload| upload.is_unfinished() && upload.follows(pending.visible);
             if !pending.text && self.upload.as_ref().is_some_and(follows) {
                 return self.slice(now, whole);
+            }
+            if self.tiles.waits() && whole.picture && !pending.text && !pending.visible {
+                return self.send_tiles(model, now, whole, image_epoch);
             }
             return if pending.visible { DrawOutcome::Deferred } else { DrawOutcome::Same };
         }
@@ -259,9 +270,87 @@ impl FramePipeline {
 
     pub fn record_written(&mut self) {
         if std::mem::take(&mut self.removing) {
-            self.tty.set_exit_sequence(&[]);
+            self.tty.set_exit_sequence(&self.exit_sequence());
         }
         self.writing_since = None;
+    }
+
+    /// Returns the sequence that removes the tiles at any progress of their transfer, and clears the
+    /// screen if they have overwritten cells.
+    fn exit_sequence(&self) -> Vec<u8> {
+        let clear = if self.tiles.is_sixel() { "\x1b\\\x1b[2J" } else { "" };
+        [self.tiles.removal().as_bytes(), clear.as_bytes()].concat()
+    }
+
+    /// Appends the bytes of the next frame to `out`.
+    fn encode(
+        &mut self,
+        model: &Model,
+        now: Duration,
+        budget: FrameBudget,
+        image_epoch: u64,
+        out: &mut Vec<u8>,
+    ) -> Frame {
+        let target = TargetFrame {
+            cells: &self.target,
+            cursor: self.cursor,
+            picture: self.view.place,
+            uncovered: &self.view.uncovered,
+            subject: image_epoch,
+            version: model.picture_version,
+            samples: model.snapshot.as_ref().map_or(0.0, |s| s.report.spp.mean),
+            settled: is_settled(model),
+        };
+        self.diff.frame(&target, now, budget, self.flow.threshold(), out)
+    }
+
+    /// Sends the next parts of tiles, and the cells that a complete tile replaces.
+    fn send_tiles(
+        &mut self,
+        model: &Model,
+        now: Duration,
+        budget: FrameBudget,
+        image_epoch: u64,
+    ) -> DrawOutcome {
+        if !budget.picture {
+            return DrawOutcome::Nothing;
+        }
+        let room = budget.bytes.saturating_sub(ACK_REQUEST_BYTES).min(TILE_BYTES);
+        let mut bytes = Vec::new();
+        let is_closed = !self.tiles.is_open() && self.terminal.synchronised;
+        while self.tiles.waits() && bytes.len() < room {
+            let before = bytes.len();
+            let complete = self.tiles.next(room - before, &mut bytes);
+            self.diff.moved();
+            if let Some(cells) = complete {
+                if self.tiles.is_sixel() {
+                    self.diff.overwritten(cells, &PanelTiles::pixel_cell());
+                }
+                let View { place, uncovered, .. } = &mut self.view;
+                self.tiles.paint(&mut self.target, *place, uncovered);
+                let text = FrameBudget { bytes: TILE_BYTES, picture: false, refinement: 0 };
+                self.encode(model, now, text, image_epoch, &mut bytes);
+            }
+            if self.tiles.is_open() || bytes.len() == before {
+                break;
+            }
+        }
+        if bytes.is_empty() {
+            return DrawOutcome::Same;
+        }
+        // The sequence that a signal or panic sends must also remove the tiles from now on.
+        self.tty.set_exit_sequence(&self.exit_sequence());
+        if self.tiles.is_open() {
+            self.flow.sent_unasked(now, bytes.len());
+        } else {
+            if is_closed {
+                bytes = [SYNCHRONISED[0], &bytes[..], SYNCHRONISED[1]].concat();
+            }
+            bytes.extend(self.flow.ack_request().unwrap_or_default().as_bytes());
+            self.flow.sent(now, bytes.len(), true, 0);
+        }
+        self.send(bytes, now);
+        DrawOutcome::Tiles
     }
 
     fn redraw(&mut self, model: &Model) {
@@ -269,6 +358,10 @@ impl FramePipeline {
         self.target.resize(Rect { x: 0, y: 0, width, height });
         self.target.reset();
         self.cursor = self.view.draw(model, &mut self.target);
+        let View { place, uncovered, .. } = &mut self.view;
+        let removal = self.tiles.update(model, &self.target, (*place, &uncovered[..]));
+        self.removal.extend(removal.as_bytes());
+        self.tiles.paint(&mut self.target, *place, uncovered);
         self.link[0] = self.link_to_export(model);
     }
 

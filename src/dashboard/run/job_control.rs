@@ -8,7 +8,9 @@ use std::io;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
-use zerkalo_terminal::{HUNG_UP, SignalEvent, SignalQueue, Signals, TimedEvent, Tty, size};
+use zerkalo_terminal::{
+    HUNG_UP, SignalEvent, SignalQueue, Signals, TimedEvent, Tty, cell_px, size,
+};
 
 /// Grace period after a terminating signal, at whose end the program exits in any case.
 pub const PATIENCE: Duration = Duration::from_secs(5);
@@ -131,6 +133,9 @@ impl Dashboard {
         self.frames.forget();
         // If the terminal is lost, the write of the next frame fails.
         let screen = size().unwrap_or(self.model.screen);
+        // The user may have changed the size of cells.
+        self.frames.terminal.cell_px = cell_px().or(self.frames.terminal.cell_px);
+        self.dispatch(Message::Terminal(Box::new(self.frames.terminal.clone())));
         self.dispatch(Message::Resize(screen));
     }
 }

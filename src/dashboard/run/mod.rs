@@ -9,9 +9,11 @@ mod frames;
 mod input;
 mod job_control;
 mod latency;
+mod tiles;
 mod worker;
 mod writer;
 
+use crate::dashboard::graphics::Graphics;
 use crate::dashboard::scene_source::is_new;
 use crate::dashboard::{Exported, Message, Model};
 use crossbeam_channel::{Receiver, unbounded};
@@ -28,8 +30,9 @@ use zerkalo_render::plan::FilmFiles;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::{Checkpoint, Options};
 use zerkalo_scene::{SceneErrors, SceneFile};
+use zerkalo_terminal::image::GraphicsMode;
 use zerkalo_terminal::{
-    Environment, HUNG_UP, InputReader, Screen, SignalQueue, query_capabilities, size,
+    Environment, HUNG_UP, InputReader, Screen, SignalQueue, cell_px, query_capabilities, size,
 };
 
 pub use crate::dashboard::model::Colors;
@@ -61,6 +64,8 @@ pub struct TerminalSetup {
     /// Set of colours; `None` to use the detected one.
     pub colors: Option<Colors>,
     pub environment: Environment,
+    /// Choice of the protocol that shows the picture.
+    pub graphics: GraphicsMode,
     /// Fixed rate of output in bytes per second; `None` to adapt it to the connection.
     pub bandwidth: Option<f64>,
 }
@@ -124,19 +129,21 @@ fn run_on_terminal(
     terminal: TerminalSetup,
     trace: Option<PathBuf>,
 ) -> io::Result<Ended> {
-    let TerminalSetup { colors, environment, bandwidth } = terminal;
+    let TerminalSetup { colors, environment, graphics, bandwidth } = terminal;
     let signals = SignalQueue::of_terminal()?;
     let screen = Screen::enter()?;
     let signals = handle_signals(signals, screen.tty.clone(), PATIENCE)?;
     let mut input = InputReader::new(&environment);
     let ending = || signals.caught().is_some();
     let capabilities = query_capabilities(&screen.tty, &mut input, environment, &ending);
-    let Ok((terminal, screen_size)) = capabilities.and_then(|terminal| Ok((terminal, size()?)))
+    let Ok((mut terminal, screen_size)) = capabilities.and_then(|terminal| Ok((terminal, size()?)))
     else {
         return Ok(Ended { signalled: Some(HUNG_UP), exported: Vec::new(), kept: Ok(None) });
     };
     model.screen = screen_size;
     model.colors = colors.unwrap_or(terminal.colors);
+    terminal.cell_px = cell_px().or(terminal.cell_px);
+    model.graphics = Graphics::new(terminal.clone(), graphics);
     let input = input::read(input)?;
     let terminal_io = TerminalIo {
         tty: screen.tty.clone(),

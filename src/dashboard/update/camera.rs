@@ -158,7 +158,10 @@ impl UpdateContext<'_> {
     /// Returns the change by a drag of one half cell. `across` is the change by a drag across the
     /// width of the picture. Returns 0 if there is no room for a picture.
     pub(super) fn per_half_cell(&self, across: f64) -> f64 {
-        self.model.layout().map_or(0.0, |layout| across / layout.raster[0] as f64)
+        self.model.layout().map_or(0.0, |layout| {
+            let share = layout.window.size[0] as f64 / f64::from(self.scene().film.size[0].max(1));
+            across * share / layout.raster[0] as f64
+        })
     }
 }
 

@@ -95,10 +95,10 @@ fn always(_: &Model) -> bool {
 /// All commands, in the order of the command palette.
 #[rustfmt::skip] // One line per row keeps the table readable.
 pub static COMMANDS: &[Command] = &[
-    command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit(LEFT)).hints(&[hint(&[H::First, H::In(Picture)], 1, "arrows", "orbit")]),
-    command("camera", "orbit right", &[(Picture, "Right")], |c| c.orbit(RIGHT)),
-    command("camera", "orbit up", &[(Picture, "Up")], |c| c.orbit(UP)),
-    command("camera", "orbit down", &[(Picture, "Down")], |c| c.orbit(DOWN)),
+    command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit_or_pan(LEFT)).hints(&[hint(&[H::First, H::In(Picture)], 1, "arrows", "orbit")]),
+    command("camera", "orbit right", &[(Picture, "Right")], |c| c.orbit_or_pan(RIGHT)),
+    command("camera", "orbit up", &[(Picture, "Up")], |c| c.orbit_or_pan(UP)),
+    command("camera", "orbit down", &[(Picture, "Down")], |c| c.orbit_or_pan(DOWN)),
     command("camera", "dolly in", &[(Picture, "PageUp")], |c| c.dolly(1.0)).hints(&[hint(&[H::In(Picture)], 2, "PgUp PgDn", "dolly")]),
     command("camera", "dolly out", &[(Picture, "PageDown")], |c| c.dolly(-1.0)),
     command("camera", "dolly in, fine", &[(Picture, "Shift-PageUp")], |c| c.dolly(0.1)),
@@ -233,6 +233,11 @@ pub static COMMANDS: &[Command] = &[
     command("picture", "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()).available(viewing),
     command("picture", "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).available(viewing).hints(&[hint(&[H::In(Probing), H::Watching], 3, "v", "views")]),
     command("picture", "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)).available(viewing),
+    command("picture", "zoom in", &[(Anywhere, "Z Alt-=")], |c| c.zoom(1, None)).available(viewing),
+    command("picture", "zoom out", &[(Anywhere, "X Alt--")], |c| c.zoom(-1, None)).available(viewing),
+    command("picture", "zoom fits: the whole picture", &[(Anywhere, "Alt-0")], |c| c.zoom_fits()).available(viewing),
+    command("picture", "loupe: automatic, always, never", &[(Anywhere, "G")], |c| c.next_loupe()).available(viewing),
+    command("picture", "next graphics protocol of the picture", &[(Anywhere, "Alt-#")], |c| c.next_graphics()).available(viewing),
     command("picture", "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()).available(viewing).hints(&[hint(&[H::Watching], 4, "i", "probe")]),
     command("picture", "probe left", &[(Probing, "Left")], |c| c.move_probe(LEFT)).available(viewing).hints(&[hint(&[H::In(Probing)], 1, "arrows", "move")]),
     command("picture", "probe right", &[(Probing, "Right")], |c| c.move_probe(RIGHT)).available(viewing),

@@ -86,14 +86,16 @@ impl UpdateContext<'_> {
         let [width, height] = self.scene().film.size.map(|n| n as usize);
         let pixel = pixel.map(|[x, y]| [x.min(width - 1), y.min(height - 1)]);
         self.model.probe = pixel;
-        self.show_view();
+        self.follow_probe();
     }
 
     /// Moves the pixel probe by about one terminal cell.
     pub(super) fn move_probe(&mut self, direction: Direction) {
-        let [width, height] = self.scene().film.size.map(|n| n as usize);
-        let raster = self.model.layout().map(|layout| layout.raster);
-        self.shift_probe(direction, raster.map_or([1; 2], |[x, y]| [width / x, 2 * height / y]));
+        let step = self.model.layout().map_or([1; 2], |layout| {
+            let ([width, height], [x, y]) = (layout.window.size, layout.raster);
+            [width / x, 2 * height / y]
+        });
+        self.shift_probe(direction, step);
     }
 
     pub(super) fn move_probe_by_pixel(&mut self, direction: Direction) {

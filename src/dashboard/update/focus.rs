@@ -24,7 +24,7 @@ impl UpdateContext<'_> {
     }
 
     /// Leaves the first of these states that is active: overlay, text editor, mode, focus on
-    /// another panel, full screen, comparison.
+    /// another panel, zoom, full screen, comparison.
     pub(super) fn leave(&mut self) {
         if self.model.overlay.is_some() {
             self.close_overlay();
@@ -34,6 +34,8 @@ impl UpdateContext<'_> {
             self.end_mode();
         } else if self.model.focus != Focus::Picture {
             self.model.focus = Focus::Picture;
+        } else if self.model.zoom.is_some() {
+            self.zoom_fits();
         } else if self.model.fullscreen {
             self.toggle_fullscreen();
         } else if !DisplayChannel::LIVE.contains(&self.model.channel) {

@@ -17,6 +17,7 @@ mod prompt;
 mod recovery;
 mod render;
 mod watch;
+mod zoom;
 
 use crate::dashboard::model::{Notice, Tone, file_notice};
 use crate::dashboard::panel_lines::{outline, outline_position, scrolled, walked};
@@ -26,7 +27,6 @@ use ratatui::layout::Rect;
 use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo_render::session::View;
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Edit, EditError, Target};
 use zerkalo_scene::value::sanitized;
@@ -106,6 +106,7 @@ impl UpdateContext<'_> {
             Message::Snapshot(snapshot) => {
                 self.model.convergence.add(&snapshot.report);
                 self.model.snapshot = Some(snapshot);
+                self.model.refresh_loupe();
                 self.repaint();
                 self.export_if_done();
             }
@@ -136,6 +137,7 @@ impl UpdateContext<'_> {
                 }
             }
             Message::ConnectionRate(rate) => self.model.connection_rate = rate,
+            Message::Terminal(terminal) => self.set_graphics(*terminal),
             Message::Tick => {}
         }
     }
@@ -160,12 +162,6 @@ impl UpdateContext<'_> {
         let scene = Arc::clone(self.model.seen());
         self.emit(Effect::Show(scene));
         self.repaint();
-    }
-
-    /// Requests snapshots of the present size, with the values at the pixel probe.
-    fn show_view(&mut self) {
-        let (raster, probe) = (self.model.raster, self.model.probe);
-        self.emit(Effect::View(View { raster, probe }));
     }
 
     fn scene(&self) -> &Arc<Scene> {
@@ -288,12 +284,7 @@ impl UpdateContext<'_> {
             };
             self.select(near.unwrap_or(Target::Camera));
         }
-        let raster = self.model.layout().map(|layout| layout.raster);
-        if let Some(raster) = raster.filter(|raster| self.model.raster != Some(*raster)) {
-            self.model.raster = Some(raster);
-            self.show_view();
-            self.repaint();
-        }
+        self.request_view();
         self.normalize_lists();
         self.autosave();
     }

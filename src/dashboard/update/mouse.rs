@@ -152,6 +152,7 @@ impl UpdateContext<'_> {
             (Mode::Move, upright) => self.move_by_hand(right, down, upright),
             (Mode::Rotate, false) => self.rotate_selection(right * 2.0),
             (Mode::Fly, false) => self.look_by_hand(right, down),
+            (Mode::Orbit, _) if self.drag_zoomed(right, down) => {}
             (Mode::Orbit, false) => self.orbit_by_hand(right, down),
             (_, true) => self.pan_by_hand(right, down),
         }
@@ -199,7 +200,7 @@ impl UpdateContext<'_> {
 
     /// Returns the pixel of the film (column, row) under the mouse.
     fn pixel_at(&self, mouse: Mouse) -> Option<[usize; 2]> {
-        self.model.layout()?.film_pixel(self.scene().film.size, mouse.column, mouse.row)
+        self.model.layout()?.film_pixel(mouse.column, mouse.row)
     }
 
     fn probe_at(&mut self, mouse: Mouse) {
@@ -219,6 +220,9 @@ impl UpdateContext<'_> {
         let Some(layout) = self.model.layout().filter(|_| !self.model.file.unreadable) else {
             return;
         };
+        if self.zoom_by_wheel(ticks, mouse) {
+            return;
+        }
         let scroll = if is_in(mouse, layout.inspector) {
             let rows = self.model.inspector_rows().map(|(rows, _)| rows).unwrap_or_default();
             let FieldList { cursor, scroll, editor, .. } = &mut self.model.inspector;

@@ -6,6 +6,7 @@ mod frame;
 mod ground_grid;
 mod image_viewer;
 mod legend;
+mod loupe;
 mod message_view;
 mod outline;
 mod overlay;
@@ -53,7 +54,7 @@ impl View {
             let settled = picture::is_settled(model);
             let raster = match model.is_empty() {
                 true => Some(ground_grid::raster(model.scene(), layout.raster)),
-                false => self.imager.raster(model, layout.raster),
+                false => self.imager.raster(model, layout),
             };
             let raster = raster.unwrap_or_default();
             self.picture = picture_cells(&raster, model.colors, settled);
@@ -79,11 +80,13 @@ impl View {
             return None;
         };
         self.picture(model, &layout);
+        let mut magnified = None;
         frame::draw(model, &layout, self.imager.legend.as_ref(), painter);
         if model.file.unreadable {
             message_view::broken(model, &layout, painter);
         } else {
             picture::paint(&self.picture, layout.image, painter.buffer);
+            magnified = loupe::draw(model, &layout, painter);
             message_view::failure(model, &layout, painter);
             message_view::empty(model, &layout, painter);
             pixel_probe::draw(model, &layout, painter);
@@ -106,6 +109,9 @@ impl View {
         if !model.file.unreadable {
             (self.place, self.uncovered) =
                 picture::visible_mask(&self.picture, layout.image, painter.buffer);
+            if let Some(cells) = &magnified {
+                loupe::uncover(cells, painter.buffer, self.place, &mut self.uncovered);
+            }
         }
         cursor
     }

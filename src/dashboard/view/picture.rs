@@ -2,14 +2,17 @@
 
 use crate::dashboard::view::false_color::{NO_HIT, Scale, difference, normal_color, object_color};
 use crate::dashboard::view::legend::Legend;
-use crate::dashboard::{DisplayChannel, Model, Overlay};
+use crate::dashboard::{DisplayChannel, Layout, Model, Overlay};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use std::sync::Arc;
-use zerkalo_render::film::{Display, LinearImage, TILE};
+use zerkalo_render::film::{Display, LinearImage, TILE, Window};
 use zerkalo_render::session::{Snapshot, State};
 use zerkalo_terminal::cells::Raster;
 use zerkalo_world::FirstHit;
+
+/// Columns and rows of half cells, and the window of the film that they show.
+type Place = ([usize; 2], Window);
 
 /// Converter of the model to rasters, images of half cells.
 #[derive(Debug, Default)]
@@ -23,7 +26,7 @@ pub struct PictureView {
 #[derive(Debug)]
 struct PinnedCache {
     picture: Arc<LinearImage>,
-    size: [usize; 2],
+    size: Place,
     radiance: Vec<[f32; 3]>,
 }
 
@@ -40,18 +43,19 @@ pub fn is_settled(model: &Model) -> bool {
 }
 
 impl PictureView {
-    /// Returns the selected channel in `size` half cells, or `None` if its data are missing.
-    pub fn raster(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
+    /// Returns the selected channel in the half cells of `layout`, or `None` if its data are missing.
+    pub fn raster(&mut self, model: &Model, layout: &Layout) -> Option<Raster> {
+        let size = (layout.raster, layout.window);
         self.legend = None;
         let snapshot = model.snapshot.as_deref()?;
         match model.channel {
             DisplayChannel::Beauty => beauty(model, snapshot, size),
             DisplayChannel::Noise => {
                 let noise = &snapshot.tiles.noise_levels;
-                self.tiles(model, snapshot, "8-bit levels of noise", size, noise)
+                self.tiles(snapshot, "8-bit levels of noise", size, noise)
             }
             DisplayChannel::Samples => {
-                self.tiles(model, snapshot, "samples per pixel", size, &snapshot.tiles.spp)
+                self.tiles(snapshot, "samples per pixel", size, &snapshot.tiles.spp)
             }
             DisplayChannel::Objects => {
                 hit_colors(snapshot, size, |hit| hit.object.map_or(NO_HIT, object_color))
@@ -73,10 +77,9 @@ impl PictureView {
     /// scale. `values` has the tiles row by row.
     fn tiles<T: Copy + Into<f64>>(
         &mut self,
-        model: &Model,
         snapshot: &Snapshot,
         unit: &'static str,
-        [width, height]: [usize; 2],
+        ([width, height], window): Place,
         values: &[T],
     ) -> Option<Raster> {
         let tiles = &snapshot.tiles;
@@ -86,38 +89,37 @@ impl PictureView {
         // The scale spans at most a factor of 1000.
         scale.low = scale.low.max(1e-3 * scale.high);
         self.legend = Some(Legend::magnitude(scale, unit));
-        let film = model.scene().film.size.map(|n| n as usize);
-        let tile = |at: usize, cells: usize, pixels: usize, tiles: usize| {
-            ((2 * at + 1) * pixels / (2 * cells) / TILE).min(tiles.saturating_sub(1))
+        let tile = |axis: usize, at: usize, cells: usize, tiles: usize| {
+            (pixel_of(window, axis, at, cells) / TILE).min(tiles.saturating_sub(1))
         };
         (all > 0).then(|| {
             Raster::from_fn(width, height, |i| {
-                let column = tile(i % width, width, film[0], tiles.columns);
-                let row = tile(i / width, height, film[1], tiles.rows);
+                let column = tile(0, i % width, width, tiles.columns);
+                let row = tile(1, i / width, height, tiles.rows);
                 scale.color(values[row * tiles.columns + column])
             })
         })
     }
 
-    fn pinned(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
+    fn pinned(&mut self, model: &Model, size: Place) -> Option<Raster> {
         let (picture, _) = model.pinned.as_ref()?;
         let same =
             |cached: &PinnedCache| Arc::ptr_eq(&cached.picture, picture) && cached.size == size;
         if !self.pinned.as_ref().is_some_and(same) {
-            let radiance = picture.resampled(size[0], size[1]);
+            // A picture of another size shows the same part.
+            let film = model.scene().film.size.map(|n| n.max(1) as usize);
+            let scaled = |n: [usize; 2]| [0, 1].map(|i| n[i] * picture.size[i] / film[i]);
+            let ([cols, rows], Window { origin, size: pixels }) = size;
+            let window = Window { origin: scaled(origin), size: scaled(pixels) };
+            let radiance = picture.resampled(window, cols, rows);
             self.pinned = Some(PinnedCache { picture: Arc::clone(picture), size, radiance });
         }
-        self.pinned.as_ref().map(|cached| displayed(&cached.radiance, &model.display, size))
+        self.pinned.as_ref().map(|cached| displayed(&cached.radiance, &model.display, size.0))
     }
 
     /// Returns a raster of the difference in luma, live minus pinned, in false colour. The scale
     /// ends at the largest difference, rounded up by [`round_up`].
-    fn difference(
-        &mut self,
-        model: &Model,
-        snapshot: &Snapshot,
-        size: [usize; 2],
-    ) -> Option<Raster> {
+    fn difference(&mut self, model: &Model, snapshot: &Snapshot, size: Place) -> Option<Raster> {
         let live = beauty(model, snapshot, size)?;
         let pinned = self.pinned(model, size)?;
         let (mut squares, mut largest) = (0.0, 0.0f64);
@@ -134,7 +136,8 @@ impl PictureView {
         let rms = (squares / lumas.len().max(1) as f64).sqrt();
         let end = round_up(largest.max(1.0));
         self.legend = Some(Legend::difference(end, rms));
-        Some(Raster::from_fn(size[0], size[1], |i| difference(lumas[i] / end)))
+        let [columns, rows] = size.0;
+        Some(Raster::from_fn(columns, rows, |i| difference(lumas[i] / end)))
     }
 }
 
@@ -145,19 +148,19 @@ fn round_up(value: f64) -> f64 {
 }
 
 /// Returns the latest picture, with the present weights of the light groups.
-fn beauty(model: &Model, snapshot: &Snapshot, size: [usize; 2]) -> Option<Raster> {
+fn beauty(model: &Model, snapshot: &Snapshot, size: Place) -> Option<Raster> {
     let picture = snapshot.picture.as_ref()?;
     let newest = snapshot.weights_for(model.seen());
     let radiance = picture.mixed(newest.as_ref().unwrap_or(&snapshot.weights));
     let live = displayed(&radiance, &model.display, [picture.cols, picture.rows]);
-    Some(resized(live, size))
+    Some(resized(live, snapshot.window, size))
 }
 
 /// Returns a raster of the first hits in the colours that `color` returns. Rays without a hit have
 /// the colour [`NO_HIT`].
 fn hit_colors(
     snapshot: &Snapshot,
-    size: [usize; 2],
+    size: Place,
     color: impl Fn(&FirstHit) -> [u8; 3],
 ) -> Option<Raster> {
     let hits = snapshot.first_hits.as_deref()?;
@@ -165,7 +168,7 @@ fn hit_colors(
         hit if hit.object.is_some() => color(hit),
         _ => NO_HIT,
     };
-    Some(resized(Raster::from_fn(hits.columns, hits.rows, pixel), size))
+    Some(resized(Raster::from_fn(hits.columns, hits.rows, pixel), hits.window, size))
 }
 
 fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 2]) -> Raster {
@@ -173,15 +176,24 @@ fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 
     Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
 }
 
-/// Scales an image without interpolation. The result is shown only until the session returns an
-/// image of the new size.
-fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
-    if [raster.width, raster.height] == [width, height] || raster.pixels.is_empty() {
+/// Returns the film pixel along `axis` at the centre of half cell `at` of `cells` across `window`.
+fn pixel_of(window: Window, axis: usize, at: usize, cells: usize) -> usize {
+    window.origin[axis] + (2 * at + 1) * window.size[axis] / (2 * cells)
+}
+
+/// Scales an image of the window `from` of the film to `place` without interpolation. Until the
+/// session returns an image of `place`, the image at hand is shown, whose edge continues outside.
+fn resized(raster: Raster, from: Window, (size, window): Place) -> Raster {
+    let old = [raster.width, raster.height];
+    if (old, from) == (size, window) || raster.pixels.is_empty() {
         return raster;
     }
-    Raster::from_fn(width, height, |i| {
-        let (x, y) = (i % width * raster.width / width, i / width * raster.height / height);
-        raster.pixels[y * raster.width + x]
+    let texel = |axis: usize, at: usize| {
+        let pixel = pixel_of(window, axis, at, size[axis]).saturating_sub(from.origin[axis]);
+        (pixel * old[axis] / from.size[axis].max(1)).min(old[axis] - 1)
+    };
+    Raster::from_fn(size[0], size[1], |i| {
+        raster.pixels[texel(1, i / size[0]) * old[0] + texel(0, i % size[0])]
     })
 }
 
@@ -219,10 +231,13 @@ mod tests {
     #[test]
     fn old_pictures_are_stretched() {
         let old = Raster::from_fn(2, 1, |i| [i as u8; 3]);
-        let new = resized(old, [4, 2]);
-        let reds: Vec<_> = new.pixels.iter().map(|p| p[0]).collect();
-        assert_eq!(reds, [0, 0, 1, 1, 0, 0, 1, 1]);
-        assert_eq!(resized(Raster::default(), [4, 2]), Raster::default());
+        let film = Window::whole([100, 50]);
+        let new = resized(old.clone(), film, ([4, 2], film));
+        let reds = |raster: Raster| raster.pixels.iter().map(|p| p[0]).collect::<Vec<_>>();
+        assert_eq!(reds(new), [0, 0, 1, 1, 0, 0, 1, 1]);
+        let part = Window { origin: [40, 0], size: [20, 10] };
+        assert_eq!(reds(resized(old, film, ([4, 1], part))), [0, 0, 1, 1]);
+        assert_eq!(resized(Raster::default(), film, ([4, 2], film)), Raster::default());
     }
 
     #[test]

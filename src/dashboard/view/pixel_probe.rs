@@ -14,14 +14,11 @@ const WIDTH: u16 = 36;
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let theme = painter.theme;
     let Some([x, y]) = model.probe else { return };
-    let film = model.scene().film.size;
-    // The half cell that shows the pixel.
-    let place = |at: usize, pixels: u32, cells: usize| {
-        ((at as f64 + 0.5) / f64::from(pixels.max(1)) * cells as f64) as u16
-    };
-    let column = layout.image.x + place(x, film[0], layout.raster[0]);
-    let row = layout.image.y + place(y, film[1], layout.raster[1]) / 2;
-    mark(column, row, painter);
+    let place = layout.cell_of([x as f64 + 0.5, y as f64 + 0.5]);
+    let [column, row] = place.unwrap_or([layout.picture.x, layout.picture.y]);
+    if place.is_some() {
+        mark(column, row, painter);
+    }
     let lines = readout(model);
     let height = lines.len() as u16 + 2;
     let area = layout.picture;
@@ -79,10 +76,9 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
 }
 
 /// Returns the label of the object that is visible at a film pixel (column, row).
-fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
+fn seen(model: &Model, pixel: [usize; 2]) -> Option<String> {
     let hits = model.snapshot.as_ref()?.first_hits.as_deref()?;
-    let [width, height] = model.scene().film.size.map(|n| n.max(1) as usize);
-    let object = hits.at(x * hits.columns / width, y * hits.rows / height)?.object?;
+    let object = hits.at_pixel(pixel)?.object?;
     let subject = Target::Object(object as usize);
     subject.exists(model.scene()).then(|| subject.label(model.scene()))
 }

@@ -11,7 +11,7 @@ use crate::dashboard::view::watch;
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 use zerkalo_render::schedule::StoppedBy;
-use zerkalo_render::session::{Report, State};
+use zerkalo_render::session::{Report, Snapshot, State};
 
 /// Part of the status line, shown or omitted as a whole.
 struct Part {
@@ -179,6 +179,13 @@ pub fn hints_line(model: &Model, area: Rect, painter: &mut Painter) {
         };
         row.put(mark, style).put(&notice.text, theme.text());
         return;
+    }
+    if let Some(Snapshot { report: Report { state: State::Finished(_), .. }, .. }) =
+        model.snapshot.as_deref()
+        && model.overlay.is_none()
+        && row.left() > 100
+    {
+        row.put_right(&model.graphics.description(), 40, theme.dim());
     }
     for hint in fitting(hints(model), row.left()) {
         row.put(hint.keys, theme.accent().add_modifier(Modifier::BOLD)).put(" ", theme.dim());

@@ -1,8 +1,9 @@
-//! Incremental downsampling of the film to a smaller image, whose pixels are called cells. Only
-//! tiles that have changed are read again.
+//! Incremental downsampling of a window of the film to a smaller image, whose pixels are called
+//! cells. Only tiles that have changed are read again.
 
 use crate::film::TILE;
 use crate::film::box_filter::{Coverage, coverage, fill_gaps};
+use crate::film::detail::Window;
 use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::store::Film;
 use crate::film::tile::Tile;
@@ -28,7 +29,8 @@ impl Thumbnail {
     /// A cell without samples gets the value of the nearest sampled cell of its row. A row without
     /// samples gets the values of the nearest sampled row. A film without samples is black.
     pub fn of_film(film: &Film, cols: usize, rows: usize) -> Self {
-        let mut downsample = IncrementalDownsample::new(film, cols, rows);
+        let whole = Window::whole([film.header.width, film.header.height]);
+        let mut downsample = IncrementalDownsample::new(film, whole, cols, rows);
         downsample.update(film, None);
         downsample.thumbnail()
     }
@@ -54,11 +56,12 @@ pub struct IncrementalDownsample {
     parts: Vec<TilePart>,
 }
 
-/// Geometry of a downsampling: `cols` x `rows` cells over a film of `size` pixels.
+/// Geometry of a downsampling: `cols` x `rows` cells over `window` of a film of `size` pixels.
 struct Layout {
     cols: usize,
     rows: usize,
     size: [usize; 2],
+    window: Window,
     groups: usize,
     /// Cells that each column of tiles overlaps.
     across: Vec<Span>,
@@ -87,30 +90,35 @@ struct TilePart {
 }
 
 impl IncrementalDownsample {
-    /// Creates the cache for `cols` x `rows` cells over an empty film of the size of `film`.
-    pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
+    /// Creates the cache for `cols` x `rows` cells over `window` of an empty film of the size of
+    /// `film`.
+    pub fn new(film: &Film, window: Window, cols: usize, rows: usize) -> Self {
         let size = [film.header.width, film.header.height];
-        let spans = |pixels: usize, cells: usize| {
-            let coverage = coverage(pixels, cells);
+        let spans = |axis: usize, cells: usize| {
+            let mut coverage = coverage(window.size[axis], cells);
+            coverage.iter_mut().for_each(|cover| cover.first += window.origin[axis]);
+            let pixels = size[axis];
             (0..pixels.div_ceil(TILE)).map(|t| Span::new(t * TILE, pixels, &coverage)).collect()
         };
         let layout = Layout {
             cols,
             rows,
             size,
+            window,
             groups: film.groups(),
-            across: spans(size[0], cols),
-            down: spans(size[1], rows),
+            across: spans(0, cols),
+            down: spans(1, rows),
         };
         let parts = (0..film.tile_count()).map(|_| TilePart::default()).collect();
         Self { layout, parts }
     }
 
-    /// Returns `true` if this cache is for `cols` x `rows` cells and a film like `film`.
-    pub fn is_for(&self, film: &Film, cols: usize, rows: usize) -> bool {
+    /// Returns `true` if this cache is for `cols` x `rows` cells over `window` of a film like `film`.
+    pub fn is_for(&self, film: &Film, window: Window, cols: usize, rows: usize) -> bool {
         let Layout { size, groups, .. } = self.layout;
         [self.layout.cols, self.layout.rows] == [cols, rows]
             && size == [film.header.width, film.header.height]
+            && window == self.layout.window
             && groups == film.groups()
     }
 
@@ -189,6 +197,9 @@ impl TilePart {
         let (across, down) = (&layout.across[index % columns], &layout.down[index / columns]);
         self.sums.clear();
         let Some(tile) = film.tile(index).filter(|tile| tile.any_sampled()) else { return };
+        if across.len * down.len == 0 {
+            return;
+        }
         let cell = 1 + 3 * layout.groups;
         let width = across.len * cell;
         self.sums.resize(down.len * width, 0.0);
@@ -241,7 +252,8 @@ mod tests {
     #[test]
     fn only_changed_tiles_are_refreshed_and_the_picture_is_that_of_a_new_raster() {
         let mut film = film(70, 40, &[1.0, 2.0]);
-        let mut raster = IncrementalDownsample::new(&film, 9, 7);
+        let whole = Window::whole([70, 40]);
+        let mut raster = IncrementalDownsample::new(&film, whole, 9, 7);
         let refresh = |raster: &mut IncrementalDownsample, film: &Film| {
             let count = raster.update(film, None);
             assert_eq!(raster.thumbnail(), Thumbnail::of_film(film, 9, 7));
@@ -264,7 +276,14 @@ mod tests {
             tile.set_lattice(8);
         });
         assert_eq!(refresh(&mut raster, &film), 15);
-        assert!(raster.is_for(&film, 9, 7) && !raster.is_for(&film, 7, 9));
+        assert!(raster.is_for(&film, whole, 9, 7) && !raster.is_for(&film, whole, 7, 9));
+        let part = Window { origin: [17, 9], size: [40, 30] };
+        assert!(!raster.is_for(&film, part, 9, 7));
+        let mut part = IncrementalDownsample::new(&film, part, 40, 30);
+        part.update(&film, None);
+        let (part, whole) = (part.thumbnail(), Thumbnail::of_film(&film, 70, 40));
+        let (part, whole) = (part.mixed(&white(2)), whole.mixed(&white(2)));
+        assert_eq!(part[40 * 20 + 30], whole[70 * (9 + 20) + 17 + 30]);
         assert_eq!(raster.thumbnail().mixed(&white(2)).len(), 63);
     }
 

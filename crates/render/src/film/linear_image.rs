@@ -1,6 +1,7 @@
 //! Copy of a film's pixels that later samples do not change.
 
 use crate::film::box_filter::{box_means, fill_gaps};
+use crate::film::detail::Window;
 use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::store::Film;
 
@@ -34,9 +35,11 @@ impl LinearImage {
         Self { size: [width, height], pixels }
     }
 
-    /// Returns the mean over each of `cols` x `rows` equal cells, `[row][column]`.
-    pub fn resampled(&self, cols: usize, rows: usize) -> Vec<[f32; 3]> {
-        let means = box_means(self.size, [cols, rows], |pixel| self.pixels[pixel].map(f64::from));
+    /// Returns the mean over each of `cols` x `rows` equal cells of `window`, `[row][column]`.
+    pub fn resampled(&self, window: Window, cols: usize, rows: usize) -> Vec<[f32; 3]> {
+        let Window { origin: [x, y], size } = window.clipped(self.size);
+        let index = |pixel: usize| (y + pixel / size[0]) * self.size[0] + x + pixel % size[0];
+        let means = box_means(size, [cols, rows], |pixel| self.pixels[index(pixel)].map(f64::from));
         means.into_iter().map(|mean| mean.map(|c| c as f32)).collect()
     }
 }
@@ -65,13 +68,13 @@ mod tests {
         assert_eq!(pixel(&image, 36, 28), film.pixel(36, 28, &mix).map(|c| c as f32));
         for (cols, rows) in [(1, 1), (5, 4), (37, 29), (80, 45)] {
             let expected = Thumbnail::of_film(&film, cols, rows).mixed(&mix);
-            let got = image.resampled(cols, rows);
+            let got = image.resampled(Window::whole(image.size), cols, rows);
             assert_eq!(got.len(), expected.len());
             for (got, expected) in got.as_flattened().iter().zip(expected.as_flattened()) {
                 assert!((got - expected).abs() <= 1e-5 * expected.abs(), "{got} {expected}");
             }
         }
-        assert!(image.resampled(0, 3).is_empty());
+        assert!(image.resampled(Window::whole(image.size), 0, 3).is_empty());
     }
 
     #[test]

@@ -7,6 +7,7 @@
 //! multiply the sums of each group by its colour and intensity.
 
 mod box_filter;
+mod detail;
 mod display;
 mod downsample;
 pub mod file;
@@ -23,6 +24,7 @@ pub mod testing;
 mod tile;
 
 pub use box_filter::box_means;
+pub use detail::{Detail, Window};
 pub use display::{Display, Tone, quantised_16};
 pub use downsample::{IncrementalDownsample, Thumbnail};
 pub use light_weights::{LightWeights, Replicates, Sums};

@@ -1,12 +1,12 @@
 //! Active render of a session: traces one scene in pieces of a fraction of a second.
 
 use crate::checkpoint::{Checkpoint, seconds_of};
-use crate::film::{Film, IncrementalDownsample};
+use crate::film::Film;
 use crate::first_hit_buffer::FirstHitBuffer;
 use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
 use crate::session::Shared;
 use crate::session::report::{QUALITIES, Report, State};
-use crate::session::snapshot::{Snapshot, View, tile_estimates};
+use crate::session::snapshot::{Snapshot, View, ViewCache, tile_estimates};
 use crate::wave::{JobReport, Wave};
 use crate::{Options, RenderState};
 use crossbeam_channel::{Receiver, Sender};
@@ -74,7 +74,7 @@ pub(super) struct ActiveRender {
     /// first measurement.
     speed: Option<f64>,
     inventory: Arc<str>,
-    downsample: Option<IncrementalDownsample>,
+    cache: ViewCache,
     first_hits: Option<Arc<FirstHitBuffer>>,
     /// Seconds per ray that the latest first-hit buffer took.
     first_hit_ray_seconds: f64,
@@ -91,7 +91,7 @@ impl ActiveRender {
             estimates_stale: false,
             speed: None,
             inventory: Arc::from(&*state.world.info().inventory),
-            downsample: None,
+            cache: ViewCache::default(),
             first_hits: None,
             first_hit_ray_seconds: FIRST_HIT_RAY_SECONDS,
             state,
@@ -204,13 +204,13 @@ impl ActiveRender {
         }
         self.update_first_hits(context, FIRST_HITS_SECONDS);
         let coarse = self.snapshot(context, State::Tracing);
-        let (display, downsample) = (self.state.display(), &mut self.downsample);
+        let (display, cache) = (self.state.display(), &mut self.cache);
         let start = Instant::now();
         let mut first = true;
         let mut publish = |film: &Film| {
             if std::mem::take(&mut first) || context.snapshot_wanted(false) {
                 let snapshot = coarse.clone();
-                context.put(snapshot.with_view(film, &display, &[], context, downsample));
+                context.put(snapshot.with_view(film, &display, &[], context, cache));
             }
         };
         let report = self.state.trace_first_pass(
@@ -249,7 +249,10 @@ impl ActiveRender {
     /// expected to take longer than `limit` seconds.
     fn update_first_hits(&mut self, context: &WorkContext, limit: f64) {
         let Some([columns, rows]) = context.view.raster else { return };
-        if self.first_hits.as_ref().is_some_and(|f| [f.columns, f.rows] == [columns, rows]) {
+        let RenderState { world, film, .. } = &self.state;
+        let window = context.view.window_of([film.header.width, film.header.height]);
+        let wanted = (window, [columns, rows]);
+        if self.first_hits.as_ref().is_some_and(|f| (f.window, [f.columns, f.rows]) == wanted) {
             return;
         }
         self.first_hits = None;
@@ -258,10 +261,8 @@ impl ActiveRender {
             return;
         }
         let start = Instant::now();
-        let RenderState { world, film, .. } = &self.state;
-        let size = [film.header.width, film.header.height];
         let trace = |points: &[[f64; 2]], hits: &mut [_]| world.first_hit(points, hits);
-        let first_hits = FirstHitBuffer::new(size, [columns, rows], trace, &context.pool);
+        let first_hits = FirstHitBuffer::new(window, [columns, rows], trace, &context.pool);
         self.first_hits = Some(Arc::new(first_hits));
         self.first_hit_ray_seconds = start.elapsed().as_secs_f64() / rays.max(1.0);
     }
@@ -291,8 +292,8 @@ impl ActiveRender {
             None => Vec::new(),
         };
         let (film, display) = (&self.state.film, self.state.display());
-        let downsample = &mut self.downsample;
-        context.put(snapshot.with_view(film, &display, &estimates, context, downsample));
+        let cache = &mut self.cache;
+        context.put(snapshot.with_view(film, &display, &estimates, context, cache));
     }
 
     pub fn report(&self, context: &WorkContext, state: State) -> Report {

@@ -34,7 +34,7 @@ use active_render::WorkContext;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 pub use picture::Picture;
 pub use report::{QUALITIES, Report, State};
-pub use snapshot::{Snapshot, TileMaps, View};
+pub use snapshot::{DETAIL_GROWTH, Snapshot, TileMaps, View};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,12 +1,13 @@
 //! Snapshots: picture and progress of a render at one moment.
 
 use crate::film::{
-    Display, Estimator, Film, IncrementalDownsample, LightWeights, PixelProbe, Thumbnail, TileNoise,
+    Detail, Display, Estimator, Film, IncrementalDownsample, LightWeights, PixelProbe, Thumbnail,
+    TileNoise, Window,
 };
 use crate::first_hit_buffer::FirstHitBuffer;
 use crate::relighting::Relighting;
 use crate::session::active_render::WorkContext;
-use crate::session::report::Report;
+use crate::session::report::{Report, State};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +19,10 @@ pub struct View {
     /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::first_hits`]. `None` requests
     /// neither of them, nor [`Snapshot::tiles`].
     pub raster: Option<[usize; 2]>,
+    /// Window of the film that the picture and the first hits show; `None` for the whole film.
+    pub window: Option<Window>,
+    /// Window of [`Snapshot::detail`], and its columns and rows.
+    pub detail: Option<(Window, [usize; 2])>,
     /// Column and row of the pixel whose samples and error are requested.
     pub probe: Option<[usize; 2]>,
 }
@@ -29,6 +34,11 @@ pub struct Snapshot {
     /// Picture of the requested size: mean radiance of each light group, to which the client
     /// applies light weights.
     pub picture: Option<Thumbnail>,
+    /// Window of the film that the picture shows.
+    pub window: Window,
+    /// Requested window as displayed. While the render is tracing, it is made again when the samples
+    /// have grown by [`DETAIL_GROWTH`]. `None` before the first complete picture.
+    pub detail: Option<Arc<Detail>>,
     /// Light weights of the scene of the report.
     pub weights: LightWeights,
     /// Light groups of the film, for [`Snapshot::weights_for`].
@@ -42,6 +52,24 @@ pub struct Snapshot {
     pub probe: Option<PixelProbe>,
 }
 
+/// Parts of snapshots that are kept, so that only what has changed is computed again.
+#[derive(Default)]
+pub(super) struct ViewCache {
+    downsample: Option<IncrementalDownsample>,
+    detail: Option<Arc<Detail>>,
+}
+
+/// Growth of the number of samples after which a detail is made again: that after which a terminal
+/// compares all cells.
+pub const DETAIL_GROWTH: f64 = 1.189;
+
+impl View {
+    /// Returns the window of the picture on a film of `size` pixels.
+    pub(super) fn window_of(&self, size: [usize; 2]) -> Window {
+        self.window.unwrap_or(Window::whole(size)).clipped(size)
+    }
+}
+
 impl Snapshot {
     /// Returns the light weights with which this picture shows `scene`, which may be newer than the
     /// snapshot. `None` if `scene` needs new samples.
@@ -50,26 +78,48 @@ impl Snapshot {
     }
 
     /// Adds the parts that the client has requested. `estimates` are the errors of the tiles of
-    /// `film`, empty before the first estimate. `downsample` caches the contributions of tiles to
-    /// the picture, so that only changed tiles are read again.
+    /// `film`, empty before the first estimate.
     pub(super) fn with_view(
         mut self,
         film: &Film,
         display: &Display,
         estimates: &[Option<TileNoise>],
         context: &WorkContext,
-        downsample: &mut Option<IncrementalDownsample>,
+        cache: &mut ViewCache,
     ) -> Self {
+        let size = [film.header.width, film.header.height];
+        self.window = context.view.window_of(size);
         if let Some([columns, rows]) = context.view.raster {
-            let cached = downsample.take().filter(|cached| cached.is_for(film, columns, rows));
-            let downsample = downsample
-                .insert(cached.unwrap_or_else(|| IncrementalDownsample::new(film, columns, rows)));
+            let window = self.window;
+            let cached = cache.downsample.take();
+            let cached = cached.filter(|cached| cached.is_for(film, window, columns, rows));
+            let new = || IncrementalDownsample::new(film, window, columns, rows);
+            let downsample = cache.downsample.insert(cached.unwrap_or_else(new));
             downsample.update(film, Some(&context.pool));
             self.picture = Some(downsample.thumbnail());
             self.tiles = Arc::new(TileMaps::of(film, estimates));
         }
         let probe = |pixel| PixelProbe::of_film(film, pixel, &self.weights, display);
         self.probe = context.view.probe.and_then(probe);
+        let is_complete = self.report.spp.min > 0;
+        self.detail = context.view.detail.filter(|_| is_complete).map(|(window, size)| {
+            let is_tracing = matches!(self.report.state, State::Tracing);
+            let growth = if is_tracing { DETAIL_GROWTH } else { 1.0 };
+            let spp = self.report.spp.mean;
+            let is_fresh = |old: &Arc<Detail>| {
+                (old.window, old.size) == (window, size)
+                    && (&old.display, &old.weights) == (display, &self.weights)
+                    && old.generation == self.report.generation
+                    && (old.spp..=old.spp * growth).contains(&spp)
+            };
+            let kept = cache.detail.take().filter(is_fresh);
+            let new = || {
+                let shown = (&self.weights, display);
+                let pixels = Detail::of_film(film, shown, window, size, &context.pool);
+                Arc::new(Detail { spp, generation: self.report.generation, ..pixels })
+            };
+            Arc::clone(cache.detail.insert(kept.unwrap_or_else(new)))
+        });
         self
     }
 }

@@ -218,7 +218,7 @@ fn invalid_scene_reports_its_fault_and_the_next_one_renders() {
 #[test]
 fn snapshots_hold_what_the_view_requests() {
     let mut session = session(endless());
-    session.set_view(View { raster: Some([8, 4]), probe: None });
+    session.set_view(View { raster: Some([8, 4]), ..View::default() });
     session.set_scene(scene(64));
     let noisy = wait_for(&session, |s| s.report.noise.is_some());
     let picture = noisy.picture.expect("a picture");

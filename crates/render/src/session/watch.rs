@@ -3,13 +3,13 @@
 
 use crate::export::update_metadata;
 use crate::film::file::{FilmFileHeader, SavedFilm};
-use crate::film::{Display, Estimator, IncrementalDownsample, Noise, TileNoise};
+use crate::film::{Display, Estimator, Noise, TileNoise};
 use crate::plan::{FilmFiles, WatchedShards};
 use crate::session::Command;
 use crate::session::active_render::WorkContext;
 use crate::session::picture::{Picture, Source};
 use crate::session::report::Report;
-use crate::session::snapshot::{Snapshot, tile_estimates};
+use crate::session::snapshot::{Snapshot, ViewCache, tile_estimates};
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant, SystemTime};
@@ -47,7 +47,7 @@ pub(super) struct Watcher {
     display: Option<Display>,
     /// Picture of the sum of all films. `None` without a film.
     shown: Option<Shown>,
-    downsample: Option<IncrementalDownsample>,
+    cache: ViewCache,
 }
 
 /// Header, report and noise estimates of the sum of all films, under the present display transform.
@@ -59,7 +59,7 @@ struct Shown {
 
 impl Watcher {
     pub fn new(films: FilmFiles, context: WorkContext) -> Self {
-        Self { films, context, display: None, shown: None, downsample: None }
+        Self { films, context, display: None, shown: None, cache: ViewCache::default() }
     }
 
     /// Executes commands and checks the film files until the session ends.
@@ -91,7 +91,7 @@ impl Watcher {
                     if self.films.poll() {
                         // The cache finds changed tiles by their sample counts. It is dropped,
                         // because equal counts in two sums of films do not mean equal samples.
-                        self.downsample = None;
+                        self.cache = ViewCache::default();
                         self.estimate();
                         changed = true;
                     }
@@ -146,14 +146,8 @@ impl Watcher {
         let Shown { header, report, tiles } = shown;
         let (report, weights) = (report.clone(), header.weights.clone());
         let snapshot = Snapshot { report, weights, ..Snapshot::default() };
-        let downsample = &mut self.downsample;
-        self.context.put(snapshot.with_view(
-            film,
-            &header.display,
-            tiles,
-            &self.context,
-            downsample,
-        ));
+        let cache = &mut self.cache;
+        self.context.put(snapshot.with_view(film, &header.display, tiles, &self.context, cache));
     }
 }
 

@@ -90,6 +90,18 @@ impl FrameDiff {
         self.encoder.moved();
     }
 
+    /// Records that an image has overwritten the cells of `area`, which count as equal to `cell`.
+    pub fn overwritten(&mut self, area: Rect, cell: &Cell) {
+        let picture = self.picture_diff.area;
+        for at in area.intersection(self.shown.area).positions() {
+            self.shown[at] = cell.clone();
+            if picture.contains(at) {
+                let row = usize::from(at.y - picture.y) * usize::from(picture.width);
+                self.picture_diff.covered(row + usize::from(at.x - picture.x));
+            }
+        }
+    }
+
     /// Appends the bytes of the next frame to `out`, within `allowance`. Appends nothing if the
     /// terminal shows `target` already. OKLab differences up to `threshold` are invisible.
     pub fn frame(

@@ -30,7 +30,7 @@ struct CellColors {
 /// Differences of all cells in the area of the picture.
 #[derive(Debug, Default)]
 pub struct PerceptualDiff {
-    area: Rect,
+    pub area: Rect,
     /// Colours of the cells, row by row.
     cells: Vec<CellColors>,
 }

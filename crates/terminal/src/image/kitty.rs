@@ -30,22 +30,19 @@ const MARKS: [u32; 88] = [
 /// Largest number of rows that placeholders can encode.
 pub const MAX_ROWS: u16 = MARKS.len() as u16;
 
-/// Returns the text of each cell in row `row` of the image. The terminal itself counts the columns
-/// from the left.
-pub fn placeholder(row: u16) -> String {
-    let mark = MARKS.get(usize::from(row)).and_then(|mark| char::from_u32(*mark));
-    [Some(PLACEHOLDER), mark].into_iter().flatten().collect()
+/// Returns the text of each cell in row `row` of the image. Without a column, the terminal itself
+/// counts the columns from the left.
+pub fn placeholder(row: u16, column: Option<u16>) -> String {
+    let mark = |n| MARKS.get(usize::from(n)).and_then(|mark: &u32| char::from_u32(*mark));
+    [Some(PLACEHOLDER), mark(row), column.and_then(mark)].into_iter().flatten().collect()
 }
 
 /// Returns the bytes that show the file `png` in the cells `place`. Inside tmux, these cells must
 /// hold placeholders. If `stretched` or `through_tmux`, the terminal scales the image to the cells.
 pub fn transfer(png: &[u8], place: Rect, stretched: bool, through_tmux: bool) -> Transfer {
+    let remove = [GIVE_UP.to_string(), removal(IMAGE.into())];
     let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
-    let letters = STANDARD.encode(png);
-    let remove = format!("\x1b_Ga=d,d=I,i={IMAGE},q=2\x1b\\");
-    // An empty last chunk (`m=0`) ends an incomplete transfer, which the terminal discards.
-    let give_up = "\x1b_Gm=0,q=2;\x1b\\".to_string();
-    let remove = [give_up, remove].map(wrap).concat().into_bytes();
+    let remove = remove.map(wrap).concat().into_bytes();
     let mut transfer = Transfer { remove, ..Transfer::default() };
     let Rect { x, y, width, height } = place;
     // The image appears at the cursor when the last chunk arrives.
@@ -57,23 +54,40 @@ pub fn transfer(png: &[u8], place: Rect, stretched: bool, through_tmux: bool) ->
     if stretched || through_tmux {
         placement += &format!(",c={width},r={height}");
     }
+    let keys = format!("i={IMAGE},{placement}");
+    send(&mut transfer, png, &keys, &cursor, through_tmux);
+    transfer
+}
+
+/// Ends an incomplete transfer, which the terminal discards, by an empty last chunk (`m=0`).
+pub const GIVE_UP: &str = "\x1b_Gm=0,q=2;\x1b\\";
+
+/// Returns the sequence that removes the image `id`.
+pub fn removal(id: u32) -> String {
+    format!("\x1b_Ga=d,d=I,i={id},q=2\x1b\\")
+}
+
+/// Appends the chunks of the file `png` to `transfer`. `keys` has the image and its placement, and
+/// `cursor` moves the cursor there.
+pub fn send(transfer: &mut Transfer, png: &[u8], keys: &str, cursor: &str, through_tmux: bool) {
+    let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
+    let letters = STANDARD.encode(png);
     let count = letters.len().div_ceil(CHUNK);
     for i in 0..count {
         let chunk = &letters[i * CHUNK..letters.len().min((i + 1) * CHUNK)];
         let first = match i {
-            0 => format!("a=T,f=100,i={IMAGE},{placement},"),
+            0 => format!("a=T,f=100,{keys},"),
             _ => String::new(),
         };
         let more = u8::from(i + 1 < count);
-        let cursor = if i == 0 || more == 0 { &*cursor } else { "" };
+        let cursor = if i == 0 || more == 0 { cursor } else { "" };
         let chunk = wrap(format!("\x1b_G{first}q=2,m={more};{chunk}\x1b\\"));
         transfer.add(format!("{cursor}{chunk}").as_bytes());
     }
-    transfer
 }
 
 /// Wraps an escape sequence so that tmux passes it on.
-fn wrapped(sequence: &str) -> String {
+pub fn wrapped(sequence: &str) -> String {
     format!("\x1bPtmux;{}\x1b\\", sequence.replace('\x1b', "\x1b\x1b"))
 }
 

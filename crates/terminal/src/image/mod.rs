@@ -5,12 +5,16 @@
 //! whole.
 
 mod kitty;
+mod panel;
 mod sixel;
+mod tile;
 mod transfer;
 
 use crate::cells::Raster;
 use crate::{Capabilities, Multiplexer};
+pub use panel::GraphicsMode;
 use ratatui::layout::Rect;
+pub use tile::TileImage;
 pub use transfer::Transfer;
 
 /// Largest width and height of a sixel image if the terminal reports no limit: the limit of xterm.
@@ -192,7 +196,7 @@ impl ViewerImage {
     /// of the image; `None` if the protocol uses none.
     pub fn placeholder(&self, row: u16) -> Option<(String, u8)> {
         let has_placeholders = self.protocol == Protocol::KittyThroughTmux;
-        has_placeholders.then(|| (kitty::placeholder(row), kitty::IMAGE))
+        has_placeholders.then(|| (kitty::placeholder(row, None), kitty::IMAGE))
     }
 }
 

@@ -7,7 +7,7 @@ use icy_sixel::{EncodeOptions, sixel_encode};
 use ratatui::layout::Rect;
 
 /// Largest number of strips: xterm keeps at most 16 images.
-const MAX_STRIPS: u16 = 16;
+pub const MAX_STRIPS: u16 = 16;
 
 /// Returns the bytes that show `image` at `place` in strips of one or more rows of cells, each with
 /// at most `colors` colours. `cell_height` is in pixels. Other output can be sent between strips.
@@ -22,16 +22,29 @@ pub fn transfer(
 ) -> Result<Transfer, String> {
     let mut transfer = Transfer { is_sixel: true, ..Transfer::default() };
     let rows = place.height.div_ceil(MAX_STRIPS).max(1);
-    let options = EncodeOptions { max_colors: colors.clamp(2, 256), ..EncodeOptions::default() };
     let width = image.width;
     let strips = image.pixels.chunks(width.max(1) * cell_height * usize::from(rows));
     for (strip, row) in strips.zip((place.y..).step_by(usize::from(rows))) {
-        let rgba: Vec<u8> = strip.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
-        let strip = sixel_encode(&rgba, width, strip.len() / width, &options)
-            .map_err(|error| error.to_string())?;
-        transfer.add(format!("{}{strip}", MoveTo(place.x, row)).as_bytes());
+        transfer.add(encoded(strip, width, [place.x, row], colors)?.as_bytes());
     }
     Ok(transfer)
+}
+
+/// Returns the sequence that shows rows of `width` pixels at a cell (column, row).
+///
+/// # Errors
+/// Fails if there are no pixels.
+pub fn encoded(
+    pixels: &[[u8; 3]],
+    width: usize,
+    [x, y]: [u16; 2],
+    colors: u16,
+) -> Result<String, String> {
+    let options = EncodeOptions { max_colors: colors.clamp(2, 256), ..EncodeOptions::default() };
+    let rgba: Vec<u8> = pixels.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
+    let height = pixels.len() / width.max(1);
+    let sixel = sixel_encode(&rgba, width, height, &options).map_err(|error| error.to_string())?;
+    Ok(format!("{}{sixel}", MoveTo(x, y)))
 }
 
 #[cfg(test)]

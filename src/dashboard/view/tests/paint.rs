@@ -27,7 +27,11 @@ fn rendered(model: &Model, spp: u32) -> Snapshot {
     let settings =
         Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     let mut session = Session::new(2, options, settings).unwrap();
-    session.set_view(View { raster: Some(model.layout().unwrap().raster), probe: model.probe });
+    session.set_view(View {
+        raster: Some(model.layout().unwrap().raster),
+        probe: model.probe,
+        ..View::default()
+    });
     session.set_scene(Arc::clone(model.scene()));
     loop {
         let snapshot = session.wait(Duration::from_secs(60)).expect("a snapshot in time");

@@ -11,7 +11,7 @@ use crate::dashboard::{
 };
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo_render::film::{Display, LightWeights, PixelProbe};
+use zerkalo_render::film::{Display, LightWeights, PixelProbe, Window};
 use zerkalo_render::schedule::{Interval, Spp, Stop, StoppedBy};
 use zerkalo_render::session::{
     Report, Snapshot, State, TileMaps, WatchReport, WatchedShards, WatchedState,
@@ -65,6 +65,8 @@ pub fn snapshot(report: Report) -> Snapshot {
         weights: LightWeights { weights: Vec::new() },
         lighting: None,
         first_hits: None,
+        window: Window::whole([640, 480]),
+        detail: None,
         tiles: Arc::new(TileMaps {
             columns: 40,
             rows: 30,

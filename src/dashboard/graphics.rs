@@ -1,0 +1,40 @@
+//! Protocol that shows the picture in its panel.
+
+use zerkalo_terminal::Capabilities;
+use zerkalo_terminal::image::{GraphicsMode, Protocol};
+
+#[derive(Clone, Debug)]
+pub struct Graphics {
+    pub mode: GraphicsMode,
+    pub terminal: Capabilities,
+    pub protocol: Protocol,
+    /// Reason for the protocol.
+    pub reason: &'static str,
+}
+
+impl Default for Graphics {
+    fn default() -> Self {
+        Self::new(Capabilities::default(), GraphicsMode::Cells)
+    }
+}
+
+impl Graphics {
+    pub fn new(terminal: Capabilities, mode: GraphicsMode) -> Self {
+        let (protocol, reason) = Protocol::of_panel(&terminal, mode);
+        Self { mode, terminal, protocol, reason }
+    }
+
+    /// Returns width and height of a cell in pixels; `None` if the picture is shown in cells.
+    pub fn cell_px(&self) -> Option<[usize; 2]> {
+        let cell = self.terminal.cell_px.filter(|_| self.protocol != Protocol::Blocks)?;
+        Some(cell.map(usize::from))
+    }
+
+    /// Describes protocol and reason, such as `cells, as the terminal reports no image protocol`.
+    pub fn description(&self) -> String {
+        match self.protocol {
+            Protocol::Blocks => format!("cells, {}", self.reason),
+            protocol => format!("{}, {}", protocol.name(), self.reason),
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Loupe: a small window over the picture in which a half cell shows one film pixel.
+
+use crate::dashboard::{DisplayChannel, Layout, Model, Overlay};
+use ratatui::layout::Rect;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use zerkalo_render::film::{Detail, TILE, Window};
+use zerkalo_render::session::{Snapshot, State};
+
+/// Largest columns and rows of the loupe, without its border.
+const LARGEST: [u16; 2] = [32, 16];
+/// Smallest columns and rows of a loupe.
+const SMALLEST: [u16; 2] = [12, 4];
+/// Seconds of rendering after which the target of the loupe follows a new view.
+const STILL_SECONDS: f64 = 0.2;
+
+/// Largest difference in levels between neighbours that counts as contrast: an edge of a lamp must
+/// not outweigh everything else.
+const MOST_CONTRAST: f64 = 40.0;
+
+/// Choice when the loupe is visible.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum LoupeMode {
+    /// Until the picture has converged.
+    #[default]
+    Automatic,
+    On,
+    Off,
+}
+
+impl LoupeMode {
+    /// All modes with their names for users, in the order in which a key cycles through them.
+    pub const NAMED: [(Self, &'static str); 3] = [
+        (Self::Automatic, "until the picture has converged"),
+        (Self::On, "always"),
+        (Self::Off, "never"),
+    ];
+}
+
+#[derive(Clone, Debug, Default)]
+pub struct Loupe {
+    pub mode: LoupeMode,
+    /// Film pixel (column, row) at the centre unless there is a probe. `None` before the first
+    /// picture.
+    pub target: Option<[usize; 2]>,
+    pub aim: Aim,
+    /// Latest pixels, which may be those of an earlier view.
+    pub detail: Option<Arc<Detail>>,
+}
+
+/// Snapshot by which the target of the loupe was chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Aim {
+    generation: u64,
+    /// `true` if it had an estimate of the errors.
+    by_noise: bool,
+}
+
+/// Place and contents of the visible loupe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoupeLayout {
+    /// Area with the border.
+    pub frame: Rect,
+    pub window: Window,
+}
+
+impl Model {
+    /// Returns the layout of the loupe; `None` if it is not visible.
+    pub fn loupe(&self, layout: &Layout) -> Option<LoupeLayout> {
+        let report = &self.snapshot.as_ref()?.report;
+        let is_wanted = match self.loupe.mode {
+            LoupeMode::Automatic => matches!(report.state, State::Tracing | State::Paused),
+            LoupeMode::On => true,
+            LoupeMode::Off => false,
+        };
+        let is_fine = layout.pixels.is_some() || 2 * layout.raster[0] >= layout.window.size[0];
+        let is_hidden = matches!(self.overlay, Some(Overlay::ViewerImage(_)));
+        if !is_wanted || is_fine || is_hidden || self.channel != DisplayChannel::Beauty {
+            return None;
+        }
+        let target = self.probe.or(self.loupe.target)?;
+        let image = layout.image;
+        // Less than half of the picture is covered in each direction.
+        let [width, height] = [image.width, image.height].map(|n| n * 3 / 8);
+        let inside = [width.min(LARGEST[0]), height.min(LARGEST[1])];
+        if inside[0] < SMALLEST[0] || inside[1] < SMALLEST[1] {
+            return None;
+        }
+        let size = [usize::from(inside[0]), 2 * usize::from(inside[1])];
+        let film = self.scene().film.size.map(|n| n as usize);
+        if size[0] > film[0] || size[1] > film[1] {
+            return None;
+        }
+        let origin = [0, 1].map(|i| target[i].saturating_sub(size[i] / 2).min(film[i] - size[i]));
+        // The loupe is in a corner away from what it shows, and away from the box of the probe.
+        let at = [0, 1].map(|i| {
+            let [start, pixels] = [layout.window.origin[i], layout.window.size[i]];
+            2 * (target[i].max(start) - start) < pixels
+        });
+        let (is_right, is_lower) = (at[0], at[1] != self.probe.is_some());
+        let [width, height] = [inside[0] + 2, inside[1] + 2];
+        let x = if is_right { image.right() - width } else { image.x };
+        let y = if is_lower { image.bottom() - height } else { image.y };
+        let frame = Rect { x, y, width, height };
+        Some(LoupeLayout { frame, window: Window { origin, size } })
+    }
+
+    /// Takes target and pixels of the loupe from the new snapshot.
+    pub(super) fn refresh_loupe(&mut self) {
+        let Some(snapshot) = &self.snapshot else { return };
+        if let Some(detail) = &snapshot.detail {
+            self.loupe.detail = Some(Arc::clone(detail));
+        }
+        let report = &snapshot.report;
+        let aim = Aim { generation: report.generation, by_noise: report.noise.is_some() };
+        let is_still = report.seconds >= STILL_SECONDS || self.loupe.target.is_none();
+        if self.zoom.is_none() && report.spp.min > 0 && is_still && self.loupe.aim != aim {
+            let is_new = self.loupe.aim.generation != aim.generation;
+            if let Some(target) = self.noisiest(snapshot, is_new) {
+                (self.loupe.target, self.loupe.aim) = (Some(target), aim);
+            }
+        }
+        let center = self.scene().film.size.map(|n| n as usize / 2);
+        self.loupe.target.get_or_insert(center);
+    }
+
+    /// Returns the film pixel at the middle of the window with the largest error in the largest
+    /// mirror, or in the whole picture if there is none. Before the first estimate of errors, it is
+    /// the window with most contrast. Unless `is_new`, the present target is kept if its window has
+    /// half as much.
+    fn noisiest(&self, snapshot: &Snapshot, is_new: bool) -> Option<[usize; 2]> {
+        let (hits, picture) = (snapshot.first_hits.as_deref()?, snapshot.picture.as_ref()?);
+        let [columns, rows] = [hits.columns, hits.rows];
+        if [picture.cols, picture.rows] != [columns, rows] || hits.texels.is_empty() {
+            return None;
+        }
+        let mut counts = BTreeMap::new();
+        let mirrors = hits.texels.iter().filter(|hit| hit.reflects);
+        mirrors.for_each(|hit| *counts.entry(hit.object).or_insert(0) += 1);
+        let largest = counts.into_iter().max_by_key(|(_, count)| *count).map(|(object, _)| object);
+        let is_mirror = |i: usize| largest.is_none_or(|object| hits.texels[i].object == object);
+        let to_8 = self.display.to_8();
+        let radiance = picture.mixed(&snapshot.weights);
+        let levels: Vec<_> = radiance.iter().map(|c| to_8(c.map(f64::from))[1]).collect();
+        let Window { origin, size } = hits.window;
+        let pixel = |i: usize| {
+            [
+                origin[0] + (2 * (i % columns) + 1) * size[0] / (2 * columns),
+                origin[1] + (2 * (i / columns) + 1) * size[1] / (2 * rows),
+            ]
+        };
+        let tiles = &snapshot.tiles;
+        let score = |i: usize| {
+            let [x, y] = pixel(i).map(|n| n / TILE);
+            if let Some(noise) = tiles.noise_levels.get(y * tiles.columns + x) {
+                return f64::from(*noise).powi(2);
+            }
+            let inside = |n: usize| n < levels.len() && is_mirror(n);
+            let step = |n: usize| f64::from(levels[i].abs_diff(levels[n])).min(MOST_CONTRAST);
+            [i + 1, i + columns].into_iter().filter(|n| inside(*n)).map(step).sum()
+        };
+        let scores: Vec<_> =
+            (0..levels.len()).map(|i| if is_mirror(i) { score(i) } else { 0.0 }).collect();
+        let reach = [(0, columns), (1, rows)].map(|(i, cells)| {
+            let pixels = usize::from(LARGEST[i]) * (i + 1);
+            pixels * cells / size[i].max(1) / 2
+        });
+        let sum = |i: usize| {
+            let (x, y) = (i % columns, i / columns);
+            let across = x.saturating_sub(reach[0])..(x + reach[0] + 1).min(columns);
+            let down = y.saturating_sub(reach[1])..(y + reach[1] + 1).min(rows);
+            let row = |y: usize| scores[y * columns..][across.clone()].iter().sum::<f64>();
+            down.map(row).sum::<f64>()
+        };
+        let mirrors = (0..levels.len()).filter(|i| is_mirror(*i)).map(|i| (i, sum(i)));
+        let (best, most) = mirrors.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
+        let now = self.loupe.target.filter(|_| !is_new).and_then(|target| {
+            let cell = |i: usize, cells: usize| {
+                (target[i].max(origin[i]) - origin[i]) * cells / size[i].max(1)
+            };
+            let i = cell(1, rows).min(rows - 1) * columns + cell(0, columns).min(columns - 1);
+            (2.0 * sum(i) >= most).then_some(target)
+        });
+        Some(now.unwrap_or(pixel(best)))
+    }
+}
