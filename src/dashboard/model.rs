@@ -57,11 +57,30 @@ pub struct FieldList {
     pub scroll: usize,
     /// Editor of the field under the cursor; `None` unless a value is being typed.
     pub editor: Option<Editor>,
+    /// Editor of the words that filter the lines; `None` unless they are being typed.
+    pub filter: Option<Editor>,
+    /// `true` if rarely used properties are visible.
+    pub unfolded: bool,
     /// Reason why the last change in a form was refused.
     pub refusal: Option<String>,
 }
 
 impl FieldList {
+    /// Returns `true` while a value or the words of the filter are being typed.
+    pub fn is_typing(&self) -> bool {
+        self.editor.is_some() || self.filter.is_some()
+    }
+
+    /// Returns the editor that receives the keys.
+    pub fn typing(&mut self) -> Option<&mut Editor> {
+        self.filter.as_mut().or(self.editor.as_mut())
+    }
+
+    /// Leaves the value and the filter as they are.
+    pub fn stop_typing(&mut self) {
+        (self.editor, self.filter) = (None, None);
+    }
+
     /// Returns the reason why the typed value or the last change was refused.
     pub fn problem(&self) -> Option<&str> {
         let typed = self.editor.as_ref().and_then(|editor| editor.problem.as_deref());
@@ -250,6 +269,7 @@ impl Model {
     pub fn context(&self) -> KeyContext {
         match (&self.overlay, self.focus, self.mode) {
             (Some(_), ..) => KeyContext::Overlay,
+            _ if self.inspector.is_typing() => KeyContext::Overlay,
             // Watched films have no camera to orbit. Their table uses the keys of the outline.
             (None, _, Mode::Orbit) if self.watch.is_some() => KeyContext::Outline,
             (None, Focus::Outline, _) => KeyContext::Outline,
@@ -284,7 +304,7 @@ impl Model {
 
     /// Returns `true` while an overlay or the inspector's text editor is open: questions must wait.
     pub fn is_busy(&self) -> bool {
-        self.overlay.is_some() || self.inspector.editor.is_some()
+        self.overlay.is_some() || self.inspector.is_typing()
     }
 
     /// Returns the values of the probed pixel; `None` without a probe, or before the session has

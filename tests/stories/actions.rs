@@ -120,11 +120,13 @@ fn camera_stories() -> Vec<Story> {
         selected("frame the selection", BALL, "f", |_, d| {
             target(d) == [0.0, 1.0, 0.0] && eye(d)[2] < 3.0
         }),
-        story("open the aperture", "* *", |_, d| {
+        story("open the aperture", "Alt-o Alt-o", |_, d| {
             let notice = d.notice();
             d.scene().camera.lens_radius() == 0.12 && notice.contains("aperture 0.12")
         }),
-        story("close the aperture", "* * /", |_, d| d.scene().camera.lens_radius() == 0.088),
+        story("close the aperture", "Alt-o Alt-o Alt-c", |_, d| {
+            d.scene().camera.lens_radius() == 0.088
+        }),
         selected("focus on the probe or the selection", BALL, "F", |_, d| {
             d.scene().camera.focus == Some(LensFocus::Point([0.0, 1.0, 0.0]))
         }),
@@ -212,10 +214,14 @@ fn object_stories() -> Vec<Story> {
 
 fn panel_stories() -> Vec<Story> {
     vec![
-        story("next panel or field", "Tab", |_, d| d.model.focus == Focus::Outline),
-        story("previous panel or field", "Shift-Tab", |_, d| d.model.focus == Focus::Inspector),
+        story("next panel, or complete, or next group of fields", "Tab", |_, d| {
+            d.model.focus == Focus::Outline
+        }),
+        story("previous panel or group of fields", "Shift-Tab", |_, d| {
+            d.model.focus == Focus::Inspector
+        }),
         selected("leave, back to the picture", BALL, "m Esc", |_, d| d.model.mode == Mode::Orbit),
-        selected("inspect, type a value, choose", BALL, "Enter", |_, d| {
+        selected("inspect, edit, confirm, choose", BALL, "Enter", |_, d| {
             d.model.focus == Focus::Inspector
         }),
         story("line below", "Tab Down", |_, d| d.model.selection == Target::View("v1".into())),
@@ -237,6 +243,15 @@ fn panel_stories() -> Vec<Story> {
         story("reset the field to its default", "Enter `7` Enter Down Backspace", |_, d| {
             eye(d) == [0.0, 1.0, 5.0]
         }),
+        story("find a field or a part of the scene", "/ `gla` Enter", |_, d| {
+            d.model.selection == GLASS
+        }),
+        selected(
+            "find a field or a part of the scene",
+            GLASS,
+            "Enter / `rou` Enter `.2` Enter",
+            |_, d| mirror(d).roughness == 0.2,
+        ),
         story("only the picture", "z", |_, d| {
             d.model.fullscreen && d.model.layout().unwrap().outline.is_none()
         }),

@@ -10,6 +10,7 @@ mod recovery;
 mod roughness;
 mod simulated_dashboard;
 mod table;
+mod typing;
 mod watch;
 
 use crate::harness::*;

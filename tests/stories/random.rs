@@ -24,7 +24,7 @@ fn keys() -> Vec<Key> {
     let bindings = COMMANDS.iter().flat_map(|command| command.keys);
     let names = bindings.flat_map(|(_, names)| names.split(' '));
     let mut keys: Vec<Key> = names.map(|name| name.parse().unwrap()).collect();
-    for c in "0123456789.-#eyxñ鏡 ".chars() {
+    for c in "0123456789.-#/eyxñ鏡 ".chars() {
         keys.push(Key { code: Code::Char(c), ctrl: false, alt: false, shift: false });
     }
     keys

@@ -26,7 +26,8 @@ impl UpdateContext<'_> {
     /// Leaves the first of these states that is active: overlay, text editor, mode, focus on
     /// another panel, full screen, comparison.
     pub(super) fn leave(&mut self) {
-        if self.model.overlay.is_some() {
+        if self.end_filter() {
+        } else if self.model.overlay.is_some() {
             self.close_overlay();
         } else if self.model.inspector.editor.is_some() {
             self.model.inspector.editor = None;
@@ -52,8 +53,8 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn next_panel(&mut self, by: isize) {
-        if self.model.overlay.is_some() {
-            self.move_cursor(by);
+        if self.model.overlay.is_some() || self.model.inspector.is_typing() {
+            self.complete(by);
             return;
         }
         let panels = match self.model.watch {
@@ -68,15 +69,18 @@ impl UpdateContext<'_> {
             self.end_mode();
             self.model.fullscreen = false;
         }
-        if focus != Focus::Inspector {
-            self.model.inspector.editor = None;
-        }
         self.model.focus = focus;
+        if focus != Focus::Inspector {
+            self.model.inspector.stop_typing();
+        } else if self.model.inspector.cursor == 0 && self.is_on_text() {
+            // Letters on a row of text would be typed. On the next row, they run commands.
+            self.move_field_cursor(1);
+        }
     }
 
     pub(super) fn toggle_fullscreen(&mut self) {
         self.model.fullscreen = !self.model.fullscreen;
         self.model.focus = Focus::Picture;
-        self.model.inspector.editor = None;
+        self.model.inspector.stop_typing();
     }
 }

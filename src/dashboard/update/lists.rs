@@ -3,7 +3,7 @@
 use crate::dashboard::panel_lines::{outline, outline_position, walked};
 use crate::dashboard::update::commands::{COMMANDS, Command};
 use crate::dashboard::{
-    Answer, Editor, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
+    Answer, Editor, Focus, KeyContext, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
     UpdateContext,
 };
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
@@ -11,6 +11,7 @@ use nucleo_matcher::{Config, Matcher, Utf32Str};
 use std::cmp::Reverse;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
+use zerkalo_scene::edit::outline as subjects;
 
 impl UpdateContext<'_> {
     /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines.
@@ -60,24 +61,12 @@ impl UpdateContext<'_> {
                 self.model.overlay = None;
                 take(self, &name);
             }
-            Some(Overlay::Form(form)) => {
-                if form.fields.editor.is_none() {
-                    self.confirm_form();
-                } else if self.apply_field() {
-                    self.move_field_cursor(1);
-                }
-            }
+            Some(Overlay::Form(_)) => self.open_row(),
             Some(Overlay::Prompt(_)) => self.answer_prompt(),
             Some(Overlay::Question(question)) => self.answer(question.at.index),
             Some(Overlay::ViewerImage(_)) => {}
             None if self.model.watch.is_some() => {}
-            None if self.model.focus == Focus::Inspector => {
-                if self.model.inspector.editor.is_some() {
-                    self.apply_field();
-                } else {
-                    self.open_field(self.typed);
-                }
-            }
+            None if self.model.focus == Focus::Inspector => self.open_row(),
             None => self.set_focus(Focus::Inspector),
         }
     }
@@ -128,8 +117,47 @@ impl UpdateContext<'_> {
         self.model.overlay = Some(Overlay::Pick(Pick { title, entries, editor, found, at, take }));
     }
 
+    /// Completes the text that is being typed, or goes to the next group of fields; `by` is 1 or, to
+    /// the previous one, -1.
+    pub(super) fn complete(&mut self, by: isize) {
+        match &mut self.model.overlay {
+            Some(Overlay::Pick(pick)) if by > 0 => {
+                if let Some(found) = pick.found.get(pick.at.index) {
+                    pick.editor = Editor::new(pick.entries[*found].name.clone());
+                    self.search();
+                }
+            }
+            None | Some(Overlay::Form(_)) => self.next_group(by),
+            Some(_) => self.move_cursor(by),
+        }
+    }
+
+    /// Filters the properties in the inspector, or elsewhere lists the parts of the scene.
+    pub(super) fn find(&mut self) {
+        if self.model.context() == KeyContext::Inspector {
+            return self.open_filter("");
+        }
+        let parts = subjects(self.scene()).into_iter().map(|(section, subject)| PickEntry {
+            name: subject.title(self.scene()),
+            note: section.title().to_string(),
+            keys: String::new(),
+        });
+        let parts: Vec<_> = parts.collect();
+        self.open_pick("find a part of the scene", parts, 0, |c, title| c.select_titled(title));
+    }
+
+    fn select_titled(&mut self, title: &str) {
+        let mut subjects = subjects(self.scene()).into_iter().map(|(_, subject)| subject);
+        if let Some(found) = subjects.find(|subject| subject.title(self.scene()) == title) {
+            self.select(found);
+        }
+    }
+
     /// Updates the open list to the entries that match the search text, best match first.
     pub(super) fn search(&mut self) {
+        if self.model.field_list().filter.is_some() {
+            self.model.field_list_mut().cursor = 0;
+        }
         let Some(Overlay::Pick(pick)) = &mut self.model.overlay else { return };
         let text = pick.editor.text();
         let pattern = Pattern::parse(text, CaseMatching::Ignore, Normalization::Smart);

@@ -104,8 +104,11 @@ impl UpdateContext<'_> {
         let opens = focused && editor.is_none();
         let lines = self.model.field_lines();
         match line.filter(|line| lines.get(*line).and_then(PanelLine::entry).is_some()) {
-            Some(line) if opens && line == cursor => self.open_field(None),
-            Some(line) if self.apply_field() => self.model.field_list_mut().cursor = line,
+            Some(line) if opens && line == cursor => self.open_row(),
+            Some(line) if self.apply_field() => {
+                self.model.field_list_mut().cursor = line;
+                self.end_filter();
+            }
             _ => {}
         }
     }

@@ -19,7 +19,7 @@ impl UpdateContext<'_> {
         apply: fn(&mut UpdateContext<'_>, &str) -> Result<(), String>,
     ) {
         let (title, help) = (title.to_string(), help.to_string());
-        let editor = Editor::new(text);
+        let editor = Editor::replacing(text);
         self.model.overlay = Some(Overlay::Prompt(Prompt { title, help, editor, apply }));
     }
 

@@ -1,9 +1,10 @@
 //! Drawing of properties and their values.
 
+use crate::dashboard::panel_lines::RowAct;
 use crate::dashboard::text::{columns, skip};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
-use crate::dashboard::{Editor, FieldLine, FieldList, Focus, Layout, Model, PanelLine};
+use crate::dashboard::{BORDER, Editor, FieldLine, FieldList, Focus, Layout, Model, PanelLine};
 use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
@@ -32,8 +33,12 @@ pub fn draw(
     painter: &mut Painter,
 ) -> Option<Position> {
     let (lines, state) = (model.field_lines(), model.field_list());
-    let label =
-        |line: &PanelLine| line.entry().map_or(0, |f| 1 + 2 * f.property.depth + columns(&f.label));
+    let label = |line: &PanelLine| match line.entry() {
+        Some(field) if field.act == RowAct::Edit => {
+            1 + 2 * field.property.depth + columns(&field.label)
+        }
+        _ => 0,
+    };
     let widest = lines.iter().map(label).max().unwrap_or(0);
     let labels = widest.min(usize::from(list.width) * 9 / 20);
     let mut typing = None;
@@ -49,8 +54,14 @@ pub fn draw(
         }
     }
     let field = lines.get(state.cursor).and_then(PanelLine::entry);
-    if let Some(field) = field.filter(|_| active) {
+    if let Some(field) = field.filter(|field| active && field.act == RowAct::Edit) {
         explain(&field.property, state.problem(), help, painter);
+    }
+    if let Some(filter) = &state.filter {
+        let inside = Rect { height: list.height + help.height, ..list };
+        let mut to = painter.edge(inside.outer(BORDER), inside.height + 1);
+        to.put(" / ", to.theme.accent());
+        typing = typed(filter, &mut to);
     }
     typing
 }
@@ -72,9 +83,21 @@ fn draw_field(
     if chosen.is_some() {
         to.fill(name);
     }
+    if field.act != RowAct::Edit {
+        let style = if chosen.is_some() { name } else { theme.accent() };
+        to.put(" ", style).put(&field.label, style.add_modifier(Modifier::BOLD));
+        return None;
+    }
     let indent = 1 + 2 * field.property.depth;
     to.skip(indent.min(labels));
-    to.put_wide(&field.label, labels.saturating_sub(indent), name).skip(2);
+    // The number's name within a list is never cut.
+    let room = labels.saturating_sub(indent);
+    let (list, number) = match field.component.and(field.label.rfind('.')) {
+        Some(at) if columns(&field.label) > room => field.label.split_at(at),
+        _ => (field.label.as_str(), ""),
+    };
+    let number_room = columns(number).min(room);
+    to.put_wide(list, room - number_room, name).put_wide(number, number_room, name).skip(2);
     if let Some(editor) = chosen.and_then(|state| state.editor.as_ref()) {
         return typed(editor, &mut to);
     }
@@ -138,6 +161,7 @@ pub fn typed(editor: &Editor, to: &mut Row) -> Option<Position> {
     let hidden = editor.input.visual_scroll(width);
     let style = Style::new().add_modifier(Modifier::UNDERLINED).patch(match editor.problem {
         Some(_) => to.theme.bad(),
+        None if editor.untouched => to.theme.accent().add_modifier(Modifier::REVERSED),
         None => to.theme.accent(),
     });
     let (x, y) = (to.x, to.y);
