@@ -19,6 +19,7 @@ pub mod overlay;
 pub mod overlay_layout;
 pub mod panel_lines;
 pub mod run;
+mod search;
 #[cfg(test)]
 mod testing;
 pub mod text;

@@ -144,6 +144,8 @@ pub struct Drag {
     pub moved: bool,
     /// `true` if the button was pressed inside the picture.
     pub in_picture: bool,
+    /// `true` if the button was pressed on a number in the inspector or a form.
+    pub on_number: bool,
 }
 
 /// State of the dashboard, from which the screen is drawn.
@@ -182,6 +184,8 @@ pub struct Model {
     /// Measured or fixed rate of output in bytes per second; `None` for a local terminal.
     pub connection_rate: Option<f64>,
     pub notice: Option<Notice>,
+    /// Names of the palette entries that were chosen last, the latest first.
+    pub recent: Vec<String>,
     pub export: Option<RunningExport>,
     pub last_export: Option<PathBuf>,
     /// `true` until the first user input. Until then, the hint line has hints for beginners.

@@ -1,8 +1,8 @@
 //! Layout of overlays and of rows in panels, shared by drawing and mouse handling.
 
 use crate::dashboard::noise_targets::ABOUT;
-use crate::dashboard::text::wrapped_rows;
-use crate::dashboard::{BORDER, Focus, Form, Layout, Model, Overlay};
+use crate::dashboard::text::{columns, wrapped_rows};
+use crate::dashboard::{BORDER, Focus, Form, Layout, Model, Overlay, PickEntry};
 use ratatui::layout::Rect;
 use zerkalo_render::session::QUALITIES;
 
@@ -24,9 +24,9 @@ impl Model {
     pub fn overlay_layout(&self) -> Option<OverlayLayout> {
         let layout = self.layout()?;
         let [width, height] = self.screen;
-        let centred = |columns: u16, rows: u16| {
+        let centred = |wide: u16, rows: u16| {
             // Status line and hint line stay visible.
-            let (columns, rows) = (columns.min(width - 2), rows.min(height - 2));
+            let (columns, rows) = (wide.min(width - 2), rows.min(height - 2));
             let [x, y] = [(width - columns) / 2, (height - 2 - rows) / 2];
             Rect { x, y, width: columns, height: rows }
         };
@@ -47,7 +47,13 @@ impl Model {
                 OverlayLayout { frame, input: Rect::default(), list, help }
             }
             Overlay::Pick(pick) => {
-                let frame = centred(84, (pick.entries.len() as u16).saturating_add(3));
+                // Descriptions are cut only where there is no room for them.
+                let widest = |of: fn(&PickEntry) -> &str| {
+                    pick.entries.iter().map(|entry| columns(of(entry))).max().unwrap_or(0)
+                };
+                let wide = widest(|e| &e.name) + widest(|e| &e.note) + widest(|e| &e.keys) + 12;
+                let rows = (pick.entries.len() as u16).saturating_add(3);
+                let frame = centred(u16::try_from(wide).unwrap_or(width).clamp(84, 160), rows);
                 let (input, list) = divided(frame.inner(BORDER), 1);
                 OverlayLayout { frame, input, list, help: Rect::default() }
             }

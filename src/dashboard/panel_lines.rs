@@ -1,6 +1,7 @@
 //! Lines of outline, inspector and form as data. `view` draws them, and `update` moves the cursor
 //! over them.
 
+use crate::dashboard::search::has_words;
 use crate::dashboard::{FieldList, Form, Model, Overlay};
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Property, Target, Widget, outline as subjects, rows};
@@ -202,16 +203,6 @@ fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
 /// Returns the position of a material's property among the [`COMMON`] ones.
 fn common(row: &Property) -> Option<usize> {
     COMMON.iter().position(|key| row.key.split('.').next() == Some(*key))
-}
-
-/// Returns `true` if each of `words` is the beginning of a word of `text`.
-fn has_words(text: &str, words: &str) -> bool {
-    let split = |text: &str| -> Vec<String> {
-        let words = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
-        words.map(str::to_lowercase).collect()
-    };
-    let own = split(text);
-    split(words).iter().all(|word| own.iter().any(|own| own.starts_with(word)))
 }
 
 /// Returns the lines that are visible in the state `list`.

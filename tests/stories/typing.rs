@@ -67,3 +67,82 @@ fn no_command_runs_while_text_is_typed() {
         unchanged(&mut desk, place, &commands());
     }
 }
+
+/// Returns the names that the palette finds for `text`.
+fn found(text: &str) -> Vec<String> {
+    let mut desk = Desk::new(ROOM);
+    desk.keys(&format!(": `{text}`"));
+    let Some(Overlay::Pick(pick)) = &desk.model.overlay else { panic!("no palette") };
+    pick.found.iter().map(|i| pick.entries[*i].name.clone()).collect()
+}
+
+#[test]
+fn palette_finds_actions_fields_and_parts_by_other_words() {
+    for (text, first) in [
+        ("export", "write a PNG"),
+        ("rough", "roughness of mirror"),
+        ("resolution", "size of film"),
+        ("depth", "max depth of trace"),
+        ("rays", "rays per pixel of film"),
+        ("reload", "read the file again"),
+        ("image", "write a PNG"),
+        ("compare", "pin this picture"),
+        ("crisp", "mirror smoother"),
+        ("gold", "metal of mirror"),
+        ("ior", "ior of mirror"),
+        ("fov", "vertical of camera"),
+        ("floor", "select object \"floor\""),
+    ] {
+        assert!(found(text).iter().take(3).any(|name| name == first), "{text}: {:?}", found(text));
+    }
+    assert_eq!(found("export")[0], "write a PNG");
+    for text in ["zoom", "settings"] {
+        assert!(!found(text).is_empty(), "{text}");
+    }
+    let mut desk = Desk::new(ROOM);
+    desk.keys(": `light dark` Enter : `light`");
+    let Some(Overlay::Pick(pick)) = &desk.model.overlay else { panic!("no palette") };
+    assert_eq!(pick.entries[pick.found[0]].name, "light darker", "the latest comes first");
+}
+
+#[test]
+fn typed_commands_set_save_and_quit() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys(": `set roughness .3` Enter");
+    assert_eq!(desk.scene().materials["mirror"].roughness, 0.3);
+    desk.keys(": `set roughness *2` Enter");
+    assert_eq!(desk.scene().materials["mirror"].roughness, 0.6);
+    desk.keys(": `set eye.x 2` Enter : `set size 128x96` Enter");
+    assert_eq!((desk.scene().camera.eye[0], desk.scene().film.size), (2.0, [128, 96]));
+    desk.keys(": `set roughness -1` Enter");
+    assert!(desk.notice().contains("roughness is -1") && desk.model.overlay.is_some());
+    desk.keys("Esc : `set colour red` Enter");
+    assert!(desk.notice().contains("no field"), "{}", desk.notice());
+    desk.keys("Esc : `w copy` Enter");
+    assert!(desk.disk.contains_key(Path::new("copy.toml")) && !desk.model.is_unsaved());
+    desk.keys("] : `wq` Enter");
+    assert!(desk.asked(|e| *e == Effect::Quit) && !desk.model.is_unsaved());
+}
+
+#[test]
+fn undo_selects_what_came_back() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Target::Object(1));
+    desk.keys("x");
+    desk.select(Target::Camera);
+    desk.keys("u");
+    assert_eq!(desk.model.selection, Target::Object(1));
+    assert_eq!(desk.text(), ROOM);
+}
+
+#[test]
+fn colours_and_calculations_are_typed_into_fields() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Target::Material("red".into()));
+    desk.keys("Enter / `col` Enter Enter `gold` Enter");
+    let gold = zerkalo_scene::value::Color::from_hex("#ffd700").unwrap();
+    assert_eq!(desk.scene().materials["red"].color, gold);
+    desk.keys("/ `refl` Enter `.25` Enter Up *");
+    desk.keys("`2` Enter");
+    assert_eq!(desk.scene().materials["red"].reflection, 0.5);
+}

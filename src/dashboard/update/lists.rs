@@ -1,14 +1,11 @@
 //! Commands that move the cursor and open the entry under it, in panels and overlays.
 
 use crate::dashboard::panel_lines::{outline, outline_position, walked};
-use crate::dashboard::update::commands::{COMMANDS, Command};
+use crate::dashboard::search::rank;
 use crate::dashboard::{
     Answer, Editor, Focus, KeyContext, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
     UpdateContext,
 };
-use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
-use nucleo_matcher::{Config, Matcher, Utf32Str};
-use std::cmp::Reverse;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
 use zerkalo_scene::edit::outline as subjects;
@@ -56,6 +53,11 @@ impl UpdateContext<'_> {
                 self.set_stop(Stop { noise_levels, rmse_linear: None, ..self.model.stop });
             }
             Some(Overlay::Pick(pick)) => {
+                let text = pick.editor.text().to_string();
+                if pick.takes_commands && self.typed_command(&text) {
+                    return;
+                }
+                let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
                 let Some(found) = pick.found.get(pick.at.index) else { return };
                 let (name, take) = (pick.entries[*found].name.clone(), pick.take);
                 self.model.overlay = None;
@@ -86,21 +88,6 @@ impl UpdateContext<'_> {
         }
     }
 
-    pub(super) fn pick_command(&mut self) {
-        let entry = |command: &Command| PickEntry {
-            name: command.label.to_string(),
-            note: command.chapter.to_string(),
-            keys: command.formatted_keys(self.model.watch.is_some(), str::to_string),
-        };
-        let listed = COMMANDS.iter().filter(|command| command.is_listed(self.model));
-        let entries: Vec<_> = listed.map(entry).collect();
-        self.open_pick("actions and keys", entries, 0, |c, label| {
-            if let Some(command) = COMMANDS.iter().find(|command| command.label == label) {
-                c.run(command);
-            }
-        });
-    }
-
     /// Opens a list with the cursor on the entry with index `index`. The name of the picked entry is
     /// passed to `take`.
     pub(super) fn open_pick(
@@ -114,7 +101,15 @@ impl UpdateContext<'_> {
         let (title, editor) = (title.into(), Editor::default());
         let found = (0..entries.len()).collect();
         let at = ListCursor { index, scroll: 0 };
-        self.model.overlay = Some(Overlay::Pick(Pick { title, entries, editor, found, at, take }));
+        self.model.overlay = Some(Overlay::Pick(Pick {
+            title,
+            entries,
+            editor,
+            found,
+            at,
+            takes_commands: false,
+            take,
+        }));
     }
 
     /// Completes the text that is being typed, or goes to the next group of fields; `by` is 1 or, to
@@ -123,7 +118,11 @@ impl UpdateContext<'_> {
         match &mut self.model.overlay {
             Some(Overlay::Pick(pick)) if by > 0 => {
                 if let Some(found) = pick.found.get(pick.at.index) {
-                    pick.editor = Editor::new(pick.entries[*found].name.clone());
+                    let name = &pick.entries[*found].name;
+                    let field = name.split_once(" of ").map(|(field, _)| field.replace(' ', "_"));
+                    let sets = pick.takes_commands && pick.editor.text().starts_with("set ");
+                    let text = field.filter(|_| sets).map(|field| format!("set {field} "));
+                    pick.editor = Editor::new(text.unwrap_or_else(|| name.clone()));
                     self.search();
                 }
             }
@@ -141,6 +140,7 @@ impl UpdateContext<'_> {
             name: subject.title(self.scene()),
             note: section.title().to_string(),
             keys: String::new(),
+            also: String::new(),
         });
         let parts: Vec<_> = parts.collect();
         self.open_pick("find a part of the scene", parts, 0, |c, title| c.select_titled(title));
@@ -160,18 +160,16 @@ impl UpdateContext<'_> {
         }
         let Some(Overlay::Pick(pick)) = &mut self.model.overlay else { return };
         let text = pick.editor.text();
-        let pattern = Pattern::parse(text, CaseMatching::Ignore, Normalization::Smart);
-        let mut matcher = Matcher::new(Config::DEFAULT);
-        let mut buffer = Vec::new();
-        let mut score_of = |entry: &PickEntry| {
-            let line = format!("{} {}", entry.name, entry.note);
-            pattern.score(Utf32Str::new(&line, &mut buffer), &mut matcher)
+        // The field is searched while its value is typed.
+        let wanted = match text.strip_prefix("set ").filter(|_| pick.takes_commands) {
+            Some(field) => field.split(' ').next().unwrap_or_default(),
+            None => text,
         };
-        let scored = pick.entries.iter().enumerate();
-        let scored = scored.filter_map(|(i, entry)| Some((Reverse(score_of(entry)?), i)));
-        let mut scored: Vec<_> = scored.collect();
-        scored.sort_unstable();
-        pick.found = scored.into_iter().map(|(_, i)| i).collect();
+        let ranked = pick.entries.iter().enumerate();
+        let mut ranked: Vec<_> =
+            ranked.filter_map(|(i, entry)| Some((rank(wanted, entry)?, i))).collect();
+        ranked.sort_unstable();
+        pick.found = ranked.into_iter().map(|(_, i)| i).collect();
         pick.at = ListCursor::default();
     }
 

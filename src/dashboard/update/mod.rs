@@ -13,6 +13,7 @@ mod keys;
 mod lists;
 mod mouse;
 mod objects;
+mod palette;
 mod prompt;
 mod recovery;
 mod render;

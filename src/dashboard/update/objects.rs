@@ -31,7 +31,7 @@ impl UpdateContext<'_> {
         self.move_by(x * right + y * DVec3::Y + z * away);
     }
 
-    fn move_by(&mut self, by: DVec3) {
+    pub(super) fn move_by(&mut self, by: DVec3) {
         let edit = edit::move_by(self.scene(), &self.model.selection, by.to_array());
         self.commit(edit, self.gesture());
     }

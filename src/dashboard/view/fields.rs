@@ -105,6 +105,14 @@ fn draw_field(
     if let Some(style) = swatch {
         to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
     }
+    if let Some([full, rest]) = bar(field).filter(|_| to.left() > BAR + 22) {
+        let color = match (field.property.widget, field.component) {
+            (Widget::Color, Some(i)) => theme.swatch(CHANNELS[i.min(2)]),
+            _ => None,
+        };
+        let color = if chosen.is_some() { name } else { color.unwrap_or(theme.accent()) };
+        to.put_right(" ", 0, name).put_right(&rest, 0, name).put_right(&full, 0, color);
+    }
     let words = matches!(field.property.widget, Widget::Choice | Widget::Kind | Widget::Switch);
     match field.value.as_str() {
         "" => to.put("–", theme.dim()),
@@ -117,6 +125,21 @@ fn draw_field(
         to.put(" ", name).put(field.property.unit, name);
     }
     None
+}
+
+/// Columns of the bar that shows where a number is in its range.
+const BAR: usize = 6;
+/// Colours of the bars of red, green and blue.
+const CHANNELS: [[u8; 3]; 3] = [[232, 98, 98], [110, 178, 98], [98, 140, 242]];
+
+/// Returns the filled and the empty part of the bar that shows where the number of `field` is in its
+/// usual range; `None` without one.
+fn bar(field: &FieldLine) -> Option<[String; 2]> {
+    let [low, high] = field.property.range?;
+    let value: f64 = field.value.parse().ok()?;
+    let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    let full = (share * BAR as f64).round() as usize;
+    Some(["━".repeat(full), "─".repeat(BAR - full)])
 }
 
 /// Draws help on a property: the reason why a value was refused, or what is valid.
