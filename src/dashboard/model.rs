@@ -3,6 +3,7 @@
 use crate::dashboard::{
     Convergence, DisplayChannel, Editor, Focus, KeyContext, ListCursor, OrphanedEdits, Overlay,
 };
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -158,6 +159,11 @@ pub struct Model {
     pub history: History,
     /// Selected part of the scene, which always exists.
     pub selection: Target,
+    /// Objects and lights that are moved, rotated, duplicated and deleted together; if there are
+    /// none, the selection is.
+    pub marked: BTreeSet<Target>,
+    /// `true` if a deletion has chosen the selection. It is not deleted before the user selects it.
+    pub chosen_by_deletion: bool,
     pub focus: Focus,
     pub mode: Mode,
     /// `true` if no panel except the picture's is visible.
@@ -262,6 +268,14 @@ impl Model {
         match &self.overlay {
             Some(Overlay::Form(form)) => &form.scene,
             _ => self.history.scene(),
+        }
+    }
+
+    /// Returns the parts of the scene that commands on the selection change.
+    pub fn targets(&self) -> Vec<Target> {
+        match self.marked.is_empty() {
+            true => vec![self.selection.clone()],
+            false => self.marked.iter().cloned().collect(),
         }
     }
 

@@ -173,6 +173,9 @@ fn object_stories() -> Vec<Story> {
         story("add an object", "a Enter Enter", |_, d| {
             d.scene().objects.len() == 4 && d.model.selection == Target::Object(3)
         }),
+        selected("mark or unmark the selection", BALL, "V Tab Down V x", |_, d| {
+            d.scene().objects.len() == 1 && d.model.marked.is_empty()
+        }),
         selected("duplicate the selection", BALL, "D", |_, d| {
             d.scene().objects.len() == 4 && d.model.selection != BALL
         }),
@@ -313,7 +316,7 @@ fn picture_stories() -> Vec<Story> {
         story("next view: noise, samples, objects, …", "v", |_, d| {
             d.model.channel == DisplayChannel::Noise
         }),
-        story("view before", "V", |_, d| d.model.channel == DisplayChannel::Depth),
+        story("view before", "Alt-v", |_, d| d.model.channel == DisplayChannel::Depth),
         story("probe a pixel", "i", |_, d| {
             d.asked(|e| matches!(e, Effect::View(view) if view.probe == Some([32, 24])))
                 && d.model.mode == Mode::Probe

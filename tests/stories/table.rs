@@ -80,5 +80,7 @@ const MOUSE: &[(&str, &str)] = &[
     ("click with the right button, or with Ctrl or Alt", "focuses the lens on the visible point"),
     ("wheel over the picture", "dollies"),
     ("click in a panel or list", "selects; a second time: opens"),
+    ("click with Ctrl or Alt in the outline", "marks or unmarks the part"),
+    ("drag a number in the inspector or a form", "changes its value"),
     ("wheel over the field under the cursor", "steps its value; elsewhere: scrolls"),
 ];

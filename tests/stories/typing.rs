@@ -125,10 +125,35 @@ fn typed_commands_set_save_and_quit() {
 }
 
 #[test]
-fn undo_selects_what_came_back() {
+fn marked_parts_change_together() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Target::Object(1));
+    desk.keys("V Tab Down V m x `1` Enter");
+    let center = |desk: &Desk, i| {
+        zerkalo_scene::edit::bounds(desk.scene(), &Target::Object(i)).unwrap().center
+    };
+    assert_eq!([center(&desk, 1).x, center(&desk, 2).x], [1.0, 1.0]);
+    desk.keys("r `180` Enter");
+    // They rotate about the point between them.
+    assert_eq!([center(&desk, 1).z, center(&desk, 2).z], [-2.0, 0.0]);
+    desk.keys("u u");
+    assert_eq!(desk.text(), ROOM, "two steps");
+    desk.select(Target::Object(1));
+    desk.keys("V Tab Down V D Right Enter");
+    assert_eq!((desk.scene().objects.len(), desk.model.marked.len()), (5, 2));
+    desk.keys("x");
+    assert_eq!(desk.scene().objects.len(), 3, "the copies are gone");
+}
+
+#[test]
+fn deletion_takes_only_what_was_selected_and_undo_selects_it() {
     let mut desk = Desk::new(ROOM);
     desk.select(Target::Object(1));
     desk.keys("x");
+    assert!(desk.notice().contains("ball deleted"), "{}", desk.notice());
+    desk.keys("x");
+    assert_eq!(desk.scene().objects.len(), 2, "{}", desk.notice());
+    assert!(desk.notice().contains("glass is selected"), "{}", desk.notice());
     desk.select(Target::Camera);
     desk.keys("u");
     assert_eq!(desk.model.selection, Target::Object(1));

@@ -33,6 +33,7 @@ impl UpdateContext<'_> {
 
     /// Selects the first part that the scene has and `before` has not.
     fn select_new(&mut self, before: &Scene) {
+        self.model.marked.clear();
         let old: HashSet<_> = outline(before).iter().map(|(_, part)| part.title(before)).collect();
         let scene = Arc::clone(self.scene());
         let parts = outline(&scene).into_iter().map(|(_, part)| part);

@@ -2,19 +2,19 @@
 
 use crate::dashboard::update::cycled;
 use crate::dashboard::{DisplayChannel, Focus, Mode, UpdateContext};
-use zerkalo_scene::edit;
+use zerkalo_scene::edit::{self, Target};
 
 impl UpdateContext<'_> {
     /// Enters `mode` and gives the focus to the picture, or reports why the selection cannot be
     /// moved or rotated.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
-        let (scene, selection) = (self.scene(), &self.model.selection);
-        let tried = match mode {
-            Mode::Move => edit::move_by(scene, selection, [0.0; 3]).err(),
-            Mode::Rotate => edit::rotate(scene, selection, 0.0).err(),
+        let scene = self.scene();
+        let tried = |part: &Target| match mode {
+            Mode::Move => edit::move_by(scene, part, [0.0; 3]).err(),
+            Mode::Rotate => edit::rotate(scene, part, 0.0).err(),
             _ => None,
         };
-        if let Some(error) = tried {
+        if let Some(error) = self.model.targets().iter().find_map(tried) {
             self.refuse(&error.to_string());
             return;
         }
@@ -33,6 +33,8 @@ impl UpdateContext<'_> {
             self.model.inspector.editor = None;
         } else if self.model.mode != Mode::Orbit {
             self.end_mode();
+        } else if !self.model.marked.is_empty() {
+            self.model.marked.clear();
         } else if self.model.focus != Focus::Picture {
             self.model.focus = Focus::Picture;
         } else if self.model.fullscreen {

@@ -224,6 +224,7 @@ impl UpdateContext<'_> {
     }
 
     fn select(&mut self, subject: Target) {
+        self.model.chosen_by_deletion = false;
         if self.model.selection != subject {
             self.model.selection = subject;
             self.model.inspector = FieldList::default();
@@ -266,6 +267,8 @@ impl UpdateContext<'_> {
             };
             self.select(near.unwrap_or(Target::Camera));
         }
+        let scene = Arc::clone(self.model.scene());
+        self.model.marked.retain(|part| part.exists(&scene));
         let raster = self.model.layout().map(|layout| layout.raster);
         if let Some(raster) = raster.filter(|raster| self.model.raster != Some(*raster)) {
             self.model.raster = Some(raster);

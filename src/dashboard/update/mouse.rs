@@ -91,6 +91,14 @@ impl UpdateContext<'_> {
             self.model.focus == Focus::Outline && subject.as_ref() == Some(&self.model.selection);
         self.set_focus(Focus::Outline);
         match subject {
+            Some(subject) if mouse.modified => {
+                // The selection joins the marked parts.
+                if self.model.marked.is_empty() && subject != self.model.selection {
+                    self.toggle_mark();
+                }
+                self.select(subject);
+                self.toggle_mark();
+            }
             Some(_) if again => self.set_focus(Focus::Inspector),
             Some(subject) => self.select(subject),
             None => {}

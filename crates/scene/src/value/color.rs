@@ -4,40 +4,14 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Color(pub [f64; 3]);
 
-/// Names of CSS and their sRGB codes.
-const NAMED: [(&str, u32); 31] = [
-    ("black", 0x000000),
-    ("white", 0xffffff),
-    ("gray", 0x808080),
-    ("grey", 0x808080),
-    ("silver", 0xc0c0c0),
-    ("red", 0xff0000),
-    ("darkred", 0x8b0000),
-    ("crimson", 0xdc143c),
-    ("tomato", 0xff6347),
-    ("coral", 0xff7f50),
-    ("salmon", 0xfa8072),
-    ("orange", 0xffa500),
-    ("gold", 0xffd700),
-    ("yellow", 0xffff00),
-    ("khaki", 0xf0e68c),
-    ("olive", 0x808000),
-    ("lime", 0x00ff00),
-    ("green", 0x008000),
-    ("darkgreen", 0x006400),
-    ("teal", 0x008080),
-    ("turquoise", 0x40e0d0),
-    ("cyan", 0x00ffff),
-    ("skyblue", 0x87ceeb),
-    ("blue", 0x0000ff),
-    ("navy", 0x000080),
-    ("indigo", 0x4b0082),
-    ("violet", 0xee82ee),
-    ("purple", 0x800080),
-    ("magenta", 0xff00ff),
-    ("pink", 0xffc0cb),
-    ("brown", 0xa52a2a),
-];
+/// Names of CSS, each before its sRGB code.
+const NAMED: &str = "\
+    black #000000 white #ffffff gray #808080 grey #808080 silver #c0c0c0 red #ff0000 \
+    darkred #8b0000 crimson #dc143c tomato #ff6347 coral #ff7f50 salmon #fa8072 orange #ffa500 \
+    gold #ffd700 yellow #ffff00 khaki #f0e68c olive #808000 lime #00ff00 green #008000 \
+    darkgreen #006400 teal #008080 turquoise #40e0d0 cyan #00ffff skyblue #87ceeb blue #0000ff \
+    navy #000080 indigo #4b0082 violet #ee82ee purple #800080 magenta #ff00ff pink #ffc0cb \
+    brown #a52a2a";
 
 impl Color {
     /// Black: zero in every channel.
@@ -74,8 +48,9 @@ impl Color {
             let doubled: String = digits.chars().flat_map(|c| [c, c]).collect();
             return Self::from_hex(&format!("#{doubled}"));
         }
-        if let Some((_, hex)) = NAMED.iter().find(|(name, _)| *name == text) {
-            return Self::from_hex(&format!("#{hex:06x}"));
+        let mut words = NAMED.split(' ');
+        if let Some(code) = words.by_ref().find(|word| *word == text).and(words.next()) {
+            return Self::from_hex(code);
         }
         if let Some(kelvin) = text.strip_suffix('k') {
             let kelvin: f64 = kelvin.trim().parse().ok()?;
