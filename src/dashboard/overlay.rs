@@ -72,7 +72,13 @@ pub struct PickEntry {
 
 impl From<Word> for PickEntry {
     fn from(Word { name, doc }: Word) -> Self {
-        Self { name, note: doc, keys: String::new(), also: String::new() }
+        Self::new(name, &doc)
+    }
+}
+
+impl PickEntry {
+    pub fn new(name: String, note: &str) -> Self {
+        Self { name, note: note.to_string(), keys: String::new(), also: String::new() }
     }
 }
 

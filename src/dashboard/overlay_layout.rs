@@ -2,7 +2,9 @@
 
 use crate::dashboard::noise_targets::ABOUT;
 use crate::dashboard::text::{columns, wrapped_rows};
-use crate::dashboard::{BORDER, Focus, Form, Layout, Model, Overlay, PickEntry};
+use crate::dashboard::{
+    BORDER, FieldList, Focus, Form, Layout, Model, Overlay, PanelLine, PickEntry,
+};
 use ratatui::layout::Rect;
 use zerkalo_render::session::QUALITIES;
 
@@ -85,7 +87,7 @@ impl Model {
         let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
         let columns = side.min(width);
         let frame = Rect { x: width - columns, y: 0, width: columns, height: height - 2 };
-        let (list, help) = split(frame.inner(BORDER), form.fields.problem().is_some());
+        let (list, help) = self.split_fields(frame.inner(BORDER), &form.fields);
         OverlayLayout { frame, input: Rect::default(), list, help }
     }
 
@@ -117,8 +119,22 @@ impl Model {
     /// Returns the area of the inspector's lines, and the area of help on the field under the
     /// cursor. Returns `None` if the inspector is hidden.
     pub fn inspector_rows(&self) -> Option<(Rect, Rect)> {
-        let problem = self.inspector.problem().is_some();
-        self.layout()?.inspector.map(|area| split(area.inner(BORDER), problem))
+        let area = self.layout()?.inspector?;
+        Some(self.split_fields(area.inner(BORDER), &self.inspector))
+    }
+
+    /// Divides the inside of a panel into the lines `list` and help on the line under the cursor,
+    /// which gets rows that the lines do not need.
+    fn split_fields(&self, inner: Rect, list: &FieldList) -> (Rect, Rect) {
+        let (lines, help) = split(inner, list.problem().is_some());
+        let shown = self.field_lines();
+        let field = shown.get(list.cursor).and_then(PanelLine::entry);
+        let width = inner.width.saturating_sub(2);
+        let texts = field.map_or_else(Vec::new, |field| field.help(list.problem()));
+        let needed: u16 = texts.iter().map(|text| wrapped_rows(text, width)).sum();
+        let free = inner.height.saturating_sub(u16::try_from(shown.len()).unwrap_or(u16::MAX));
+        let rows = if help.height == 0 { 0 } else { help.height.max(needed.min(free)) };
+        divided(inner, lines.height + help.height - rows)
     }
 }
 

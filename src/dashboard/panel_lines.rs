@@ -106,6 +106,20 @@ impl FieldLine {
         }
     }
 
+    /// Returns the help on the line: `problem`, or a description and the valid values, with the
+    /// default if the present value is another.
+    pub fn help(&self, problem: Option<&str>) -> Vec<String> {
+        let Property { doc, expected, default, is_default, .. } = &self.property;
+        let texts = match (problem, default) {
+            (Some(problem), _) => vec![problem.to_string()],
+            (None, Some(default)) if !default.is_empty() && !is_default => {
+                vec![doc.to_string(), format!("{expected}; default {default}")]
+            }
+            (None, _) => vec![doc.to_string(), expected.clone()],
+        };
+        texts.into_iter().filter(|text| !text.is_empty()).collect()
+    }
+
     /// Returns `true` if both lines show the same number or property.
     pub fn is_same(&self, other: &Self) -> bool {
         let id = |line: &Self| (line.act, line.component);
@@ -179,7 +193,7 @@ pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
         _ => false,
     };
     let what = form.title.strip_prefix("new ").unwrap_or(&form.title);
-    let add = FieldLine::without_property(RowAct::Add, format!("Add {what}"));
+    let add = FieldLine::without_property(RowAct::Add, format!("✓ Add {what}"));
     let mut lines = vec![PanelLine::Entry(Box::new(add))];
     lines.extend(match has_new_material {
         true => inspector(&form.scene, &form.subject),

@@ -3,7 +3,7 @@
 use crate::dashboard::panel_lines::RowAct;
 use crate::dashboard::panel_lines::walked;
 use crate::dashboard::update::Coalesce;
-use crate::dashboard::{Editor, FieldLine, Overlay, PanelLine, UpdateContext};
+use crate::dashboard::{Editor, FieldLine, KeyContext, Overlay, PanelLine, UpdateContext};
 use zerkalo_scene::edit::{self, Edit, EditError, Widget, Word};
 use zerkalo_scene::value::{number, round_significant};
 
@@ -57,6 +57,17 @@ impl UpdateContext<'_> {
     /// Returns `true` if the cursor is on a property that takes text.
     pub(super) fn is_on_text(&self) -> bool {
         self.field().is_some_and(|field| field.property.widget == Widget::Text)
+    }
+
+    /// Moves the cursor of the inspector from a first line with text to the next, where letters run
+    /// commands.
+    pub(super) fn skip_text(&mut self) {
+        if self.model.context() == KeyContext::Inspector
+            && self.model.inspector.cursor == 0
+            && self.is_on_text()
+        {
+            self.move_field_cursor(1);
+        }
     }
 
     /// Confirms what is being typed and moves on, or carries out Enter on the row under the cursor.

@@ -74,9 +74,8 @@ impl UpdateContext<'_> {
         self.model.focus = focus;
         if focus != Focus::Inspector {
             self.model.inspector.stop_typing();
-        } else if self.model.inspector.cursor == 0 && self.is_on_text() {
-            // Letters on a row of text would be typed. On the next row, they run commands.
-            self.move_field_cursor(1);
+        } else {
+            self.skip_text();
         }
     }
 

@@ -8,7 +8,7 @@ use crate::dashboard::{
 };
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
-use zerkalo_scene::edit::outline as subjects;
+use zerkalo_scene::edit::{Section, Target, outline as subjects};
 
 impl UpdateContext<'_> {
     /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines.
@@ -136,13 +136,11 @@ impl UpdateContext<'_> {
         if self.model.context() == KeyContext::Inspector {
             return self.open_filter("");
         }
-        let parts = subjects(self.scene()).into_iter().map(|(section, subject)| PickEntry {
-            name: subject.title(self.scene()),
-            note: section.title().to_string(),
-            keys: String::new(),
-            also: String::new(),
-        });
-        let parts: Vec<_> = parts.collect();
+        let parts = subjects(self.scene()).into_iter();
+        let entry = |(section, subject): (Section, Target)| {
+            PickEntry::new(subject.title(self.scene()), section.title())
+        };
+        let parts: Vec<_> = parts.map(entry).collect();
         self.open_pick("find a part of the scene", parts, 0, |c, title| c.select_titled(title));
     }
 

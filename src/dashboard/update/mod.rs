@@ -228,6 +228,7 @@ impl UpdateContext<'_> {
         if self.model.selection != subject {
             self.model.selection = subject;
             self.model.inspector = FieldList::default();
+            self.skip_text();
         }
     }
 

@@ -59,14 +59,8 @@ impl UpdateContext<'_> {
             self.model.recent.iter().position(|name| *name == entry.name).unwrap_or(usize::MAX)
         };
         entries.sort_by_key(recent);
-        self.open_pick(
-            "actions, fields and parts · w  q  set FIELD VALUE",
-            entries,
-            0,
-            |c, name| {
-                c.choose(name);
-            },
-        );
+        let title = "actions, fields and parts · w  q  set FIELD VALUE";
+        self.open_pick(title, entries, 0, |c, name| c.choose(name));
         if let Some(Overlay::Pick(pick)) = &mut self.model.overlay {
             pick.takes_commands = true;
         }
@@ -86,10 +80,16 @@ impl UpdateContext<'_> {
         };
         let mut commands: Vec<_> = COMMANDS.iter().filter(|c| c.is_listed(self.model)).collect();
         commands.sort_by_key(rank);
-        let entries: Vec<_> = commands.into_iter().map(|c| PickEntry::of(c, watching)).collect();
+        let entry = |command: &Command| {
+            let entry = PickEntry::of(command, watching);
+            let here = |place| command.keys.iter().find(|(context, _)| *context == place);
+            // The place of keys that work here goes without saying.
+            let keys = context.chain().find_map(here).map(|(_, keys)| keys.to_string());
+            PickEntry { keys: keys.unwrap_or(entry.keys), ..entry }
+        };
+        let entries: Vec<_> = commands.into_iter().map(entry).collect();
         let place = context.place();
-        let title =
-            format!("keys{}{place} · type to search", if place.is_empty() { "" } else { " " });
+        let title = format!("keys {place} · type to search").replace("  ", " ");
         self.open_pick(title, entries, 0, |c, label| c.choose(label));
     }
 
@@ -109,16 +109,13 @@ impl UpdateContext<'_> {
                 let last = field.property.key.rsplit('.').next();
                 let also = SYNONYMS.iter().find(|(key, _)| Some(*key) == last);
                 let also = also.map_or("", |(_, words)| words).to_string();
-                let note = field.property.value.clone();
-                let entry = PickEntry { name, also, note, keys: String::new() };
+                let entry = PickEntry { also, ..PickEntry::new(name, &field.property.value) };
                 list.push((entry, Choice::Edit(field)));
             }
         }
         for (section, subject) in subjects(scene) {
             let name = format!("select {}", subject.title(scene));
-            let note = section.title().to_string();
-            let entry = PickEntry { name, also: String::new(), note, keys: String::new() };
-            list.push((entry, Choice::Select(subject)));
+            list.push((PickEntry::new(name, section.title()), Choice::Select(subject)));
         }
         list
     }
@@ -168,32 +165,27 @@ impl UpdateContext<'_> {
     /// Carries out `text` if it is a typed command. Returns `false` if it is none.
     pub(super) fn typed_command(&mut self, text: &str) -> bool {
         let (word, rest) = text.trim().split_once(' ').unwrap_or((text.trim(), ""));
-        let rest = rest.trim();
+        let is_edited = self.model.is_unsaved();
+        let label = match (word, rest) {
+            ("w", "") => "save",
+            ("wq", "") if is_edited => "save",
+            ("q" | "wq", "") => "quit",
+            _ => "",
+        };
+        let edits = self.model.watch.is_none() && !self.model.file.unreadable;
         let palette = self.model.overlay.take();
-        let result = match (word, rest) {
-            ("w", "") => {
-                self.save();
+        let result = match word {
+            _ if !label.is_empty() => {
+                self.model.quit_when_saved = word == "wq" && is_edited;
+                self.choose(label);
                 Ok(())
             }
-            ("w", path) => self.save_to(path),
-            ("q", "") => {
-                self.quit();
-                Ok(())
-            }
-            ("wq", "") if self.model.is_unsaved() => {
-                self.model.quit_when_saved = true;
-                self.save();
-                Ok(())
-            }
-            ("wq", "") => {
-                self.quit();
-                Ok(())
-            }
-            ("q!", "") => {
+            "q!" => {
                 self.emit(Effect::Quit);
                 Ok(())
             }
-            ("set", rest) => self.set_typed(rest),
+            "w" if edits => self.save_to(rest.trim()),
+            "set" if edits => self.set_typed(rest.trim()),
             _ => {
                 self.model.overlay = palette;
                 return false;
@@ -221,15 +213,10 @@ impl UpdateContext<'_> {
         };
         let found = fields.iter().find(|field| number(field) || whole(field));
         let field = found.ok_or_else(|| format!("There is no field \"{name}\" here."))?;
-        let field = match number(field) {
-            true => FieldLine::clone(field),
-            false if field.property.components.len() > 1 => FieldLine {
-                component: None,
-                value: field.property.value.clone(),
-                ..FieldLine::clone(field)
-            },
-            false => FieldLine::clone(field),
-        };
+        let mut field = FieldLine::clone(field);
+        if !number(&field) {
+            (field.component, field.value) = (None, field.property.value.clone());
+        }
         let edit = self.set_field(&field, value).map_err(|error| error.to_string())?;
         self.record(edit, Coalesce::Single);
         let label = field.subject.label(self.scene());
@@ -242,15 +229,8 @@ impl UpdateContext<'_> {
         let (done, undone) = self.model.history.labels();
         let count = done.len();
         let entry = |(i, label): (usize, &str)| {
-            let note = if i > count {
-                "undone"
-            } else if i == count {
-                "now"
-            } else {
-                ""
-            };
-            let (also, keys) = (String::new(), String::new());
-            PickEntry { name: format!("{i} {label}"), also, note: note.to_string(), keys }
+            let note = ["", "now", "undone"][usize::from(i >= count) + usize::from(i > count)];
+            PickEntry::new(format!("{i} {label}"), note)
         };
         let labels = std::iter::once("as opened").chain(done).chain(undone);
         let entries: Vec<_> = labels.enumerate().map(entry).collect();
@@ -261,11 +241,7 @@ impl UpdateContext<'_> {
             for _ in 0..times {
                 if undo { c.undo() } else { c.redo() }
             }
-            c.say(format!(
-                "{times} {} {}",
-                if times == 1 { "step" } else { "steps" },
-                if undo { "undone" } else { "redone" }
-            ));
+            c.say(format!("now at step {name}"));
         });
     }
 }

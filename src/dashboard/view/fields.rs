@@ -9,7 +9,7 @@ use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
 use zerkalo_render::film::Display;
-use zerkalo_scene::edit::{Property, Widget};
+use zerkalo_scene::edit::Widget;
 use zerkalo_scene::value::{number, round_significant};
 
 /// Unit of nearly all numbers, therefore shown only for the property under the cursor.
@@ -54,8 +54,8 @@ pub fn draw(
         }
     }
     let field = lines.get(state.cursor).and_then(PanelLine::entry);
-    if let Some(field) = field.filter(|field| active && field.act == RowAct::Edit) {
-        explain(&field.property, state.problem(), help, painter);
+    if let Some(field) = field.filter(|_| active) {
+        explain(field, state.problem(), help, painter);
     }
     if let Some(filter) = &state.filter {
         let inside = Rect { height: list.height + help.height, ..list };
@@ -85,6 +85,8 @@ fn draw_field(
     }
     if field.act != RowAct::Edit {
         let style = if chosen.is_some() { name } else { theme.accent() };
+        let hint = if field.act == RowAct::Add { "Enter " } else { "" };
+        to.put_right(hint, columns(&field.label) + 2, style);
         to.put(" ", style).put(&field.label, style.add_modifier(Modifier::BOLD));
         return None;
     }
@@ -105,7 +107,8 @@ fn draw_field(
     if let Some(style) = swatch {
         to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
     }
-    if let Some([full, rest]) = bar(field).filter(|_| to.left() > BAR + 22) {
+    let needed = columns(&brief(&field.value)) + columns(field.property.unit) + BAR + 4;
+    if let Some([full, rest]) = bar(field).filter(|_| to.left() >= needed) {
         let color = match (field.property.widget, field.component) {
             (Widget::Color, Some(i)) => theme.swatch(CHANNELS[i.min(2)]),
             _ => None,
@@ -142,28 +145,15 @@ fn bar(field: &FieldLine) -> Option<[String; 2]> {
     Some(["━".repeat(full), "─".repeat(BAR - full)])
 }
 
-/// Draws help on a property: the reason why a value was refused, or what is valid.
-fn explain(property: &Property, problem: Option<&str>, area: Rect, painter: &mut Painter) {
+/// Draws help on a field: the reason why a value was refused, or what is valid.
+fn explain(field: &FieldLine, problem: Option<&str>, area: Rect, painter: &mut Painter) {
     let theme = painter.theme;
-    let mut texts = match problem {
-        Some(problem) => vec![(problem.to_string(), theme.bad())],
-        None => vec![
-            (property.doc.to_string(), theme.dim()),
-            (expected(property), theme.dim().add_modifier(Modifier::ITALIC)),
-        ],
+    let styles = match problem {
+        Some(_) => [theme.bad(); 2],
+        None => [theme.dim(), theme.dim().add_modifier(Modifier::ITALIC)],
     };
-    texts.retain(|(text, _)| !text.is_empty());
+    let texts: Vec<_> = field.help(problem).into_iter().zip(styles).collect();
     painter.paragraphs(area.inner(Margin::new(1, 0)), &texts);
-}
-
-/// Describes valid values, with the default if the present value is another.
-fn expected(property: &Property) -> String {
-    match &property.default {
-        Some(default) if !default.is_empty() && !property.is_default => {
-            format!("{}; default {default}", property.expected)
-        }
-        _ => property.expected.clone(),
-    }
 }
 
 /// Draws a heading, and a horizontal line from there to the column before the last.
