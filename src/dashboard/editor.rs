@@ -10,13 +10,20 @@ const MOST: usize = 400;
 #[derive(Clone, Debug, Default)]
 pub struct Editor {
     pub input: Input,
+    /// `true` until the first key: a typed character then replaces the whole text.
+    pub untouched: bool,
     /// Reason why the text was refused, shown until the text changes.
     pub problem: Option<String>,
 }
 
 impl Editor {
     pub fn new(text: impl Into<String>) -> Self {
-        Self { input: Input::new(text.into()), problem: None }
+        Self { input: Input::new(text.into()), ..Self::default() }
+    }
+
+    /// Creates an editor whose `text` is replaced by the first character that is typed.
+    pub fn replacing(text: impl Into<String>) -> Self {
+        Self { untouched: true, ..Self::new(text) }
     }
 
     pub fn text(&self) -> &str {
@@ -47,6 +54,7 @@ impl Editor {
             (Code::Char('y'), true, false) => InputRequest::Yank,
             _ => return false,
         };
+        self.untouched = false;
         if self.input.handle(request).is_some_and(|changed| changed.value) {
             self.problem = None;
         }
@@ -62,6 +70,9 @@ impl Editor {
     }
 
     fn insert(&mut self, c: char) -> bool {
+        if std::mem::take(&mut self.untouched) {
+            self.input.reset();
+        }
         if !c.is_control() && self.text().chars().count() < MOST {
             self.input.handle(InputRequest::InsertChar(c));
             self.problem = None;

@@ -9,6 +9,7 @@ fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Pick(_) | Overlay::NoiseTargets(_) | Overlay::Question(_)) => HintLine::List,
         Some(Overlay::ViewerImage(_)) => return None,
+        None | Some(Overlay::Form(_)) if model.field_list().filter.is_some() => HintLine::List,
         Some(Overlay::Form(form)) if form.fields.editor.is_none() => HintLine::Form,
         Some(Overlay::Form(_) | Overlay::Prompt(_)) => HintLine::Typing,
         None if model.inspector.editor.is_some() => HintLine::Typing,

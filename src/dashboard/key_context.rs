@@ -20,7 +20,7 @@ pub enum KeyContext {
     Probing,
     Outline,
     Inspector,
-    /// An overlay is open.
+    /// An overlay is open, or text is being typed in the inspector.
     Overlay,
 }
 
@@ -37,7 +37,7 @@ impl KeyContext {
             Self::Probing => "while probing",
             Self::Outline => "in the outline",
             Self::Inspector => "in the inspector",
-            Self::Overlay => "in lists and forms",
+            Self::Overlay => "in lists, forms and fields",
         }
     }
 

@@ -144,12 +144,18 @@ impl Model {
         // The outline and the inspector share `left` rows. In less than 16 rows, there is room for
         // one of them only.
         let left = rows - plot;
+        let scene = self.scene();
+        let parts = [scene.objects.len(), scene.lights.len(), scene.materials.len()];
+        let headings = 3 + parts.iter().filter(|n| **n > 0).count();
+        // Camera, ambient light, background, film and integrator.
+        let lines = 5 + headings + scene.cameras.len() + parts.iter().sum::<usize>();
+        let needed = u16::try_from(lines + 2).unwrap_or(u16::MAX);
         let outline = match self.focus {
             _ if self.watch.is_some() => left,
             Focus::Outline if rows < 16 => left,
             _ if rows < 16 => 0,
-            Focus::Outline if rows < 40 => left * 3 / 5,
-            _ => left * 2 / 5,
+            Focus::Outline if rows < 40 => needed.min(left * 3 / 5),
+            _ => needed.min(left * 2 / 5),
         };
         let part = |y, height| (height > 0).then_some(Rect { y: side.y + y, height, ..side });
         [part(0, outline), part(outline, left - outline), part(left, plot)]

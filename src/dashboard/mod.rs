@@ -22,6 +22,7 @@ pub mod overlay_layout;
 pub mod panel_lines;
 pub mod run;
 pub mod scene_source;
+mod search;
 #[cfg(test)]
 mod testing;
 pub mod text;

@@ -7,6 +7,7 @@ use crate::dashboard::{
     Convergence, DisplayChannel, Editor, Focus, Format, KeyContext, ListCursor, OrphanedEdits,
     Overlay, SceneSource,
 };
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -64,11 +65,30 @@ pub struct FieldList {
     pub scroll: usize,
     /// Editor of the field under the cursor; `None` unless a value is being typed.
     pub editor: Option<Editor>,
+    /// Editor of the words that filter the lines; `None` unless they are being typed.
+    pub filter: Option<Editor>,
+    /// `true` if rarely used properties are visible.
+    pub unfolded: bool,
     /// Reason why the last change in a form was refused.
     pub refusal: Option<String>,
 }
 
 impl FieldList {
+    /// Returns `true` while a value or the words of the filter are being typed.
+    pub fn is_typing(&self) -> bool {
+        self.editor.is_some() || self.filter.is_some()
+    }
+
+    /// Returns the editor that receives the keys.
+    pub fn typing(&mut self) -> Option<&mut Editor> {
+        self.filter.as_mut().or(self.editor.as_mut())
+    }
+
+    /// Leaves the value and the filter as they are.
+    pub fn stop_typing(&mut self) {
+        (self.editor, self.filter) = (None, None);
+    }
+
     /// Returns the reason why the typed value or the last change was refused.
     pub fn problem(&self) -> Option<&str> {
         let typed = self.editor.as_ref().and_then(|editor| editor.problem.as_deref());
@@ -134,6 +154,8 @@ pub struct Drag {
     pub moved: bool,
     /// `true` if the button was pressed inside the picture.
     pub in_picture: bool,
+    /// `true` if the button was pressed on a number in the inspector or a form.
+    pub on_number: bool,
 }
 
 /// View that is not the camera of the scene.
@@ -157,6 +179,11 @@ pub struct Model {
     pub view: Option<FreeView>,
     /// Selected part of the scene, which always exists.
     pub selection: Target,
+    /// Objects and lights that are moved, rotated, duplicated and deleted together; if there are
+    /// none, the selection is.
+    pub marked: BTreeSet<Target>,
+    /// `true` if a deletion has chosen the selection. It is not deleted before the user selects it.
+    pub chosen_by_deletion: bool,
     pub focus: Focus,
     pub mode: Mode,
     /// `true` if no panel except the picture's is visible.
@@ -183,6 +210,8 @@ pub struct Model {
     /// Measured or fixed rate of output in bytes per second; `None` for a local terminal.
     pub connection_rate: Option<f64>,
     pub notice: Option<Notice>,
+    /// Names of the palette entries that were chosen last, the latest first.
+    pub recent: Vec<String>,
     pub export: Option<RunningExport>,
     pub last_export: Option<PathBuf>,
     /// `true` until the first user input. Until then, the hint line has hints for beginners.
@@ -304,6 +333,14 @@ impl Model {
         }
     }
 
+    /// Returns the parts of the scene that commands on the selection change.
+    pub fn targets(&self) -> Vec<Target> {
+        match self.marked.is_empty() {
+            true => vec![self.selection.clone()],
+            false => self.marked.iter().cloned().collect(),
+        }
+    }
+
     pub fn is_unsaved(&self) -> bool {
         !self.history.is_saved()
     }
@@ -312,6 +349,7 @@ impl Model {
     pub fn context(&self) -> KeyContext {
         match (&self.overlay, self.focus, self.mode) {
             (Some(_), ..) => KeyContext::Overlay,
+            _ if self.inspector.is_typing() => KeyContext::Overlay,
             // Watched films have no camera to orbit. Their table uses the keys of the outline.
             (None, _, Mode::Orbit) if self.watch.is_some() => KeyContext::Outline,
             (None, Focus::Outline, _) => KeyContext::Outline,
@@ -346,7 +384,7 @@ impl Model {
 
     /// Returns `true` while an overlay or the inspector's text editor is open: questions must wait.
     pub fn is_busy(&self) -> bool {
-        self.overlay.is_some() || self.inspector.editor.is_some()
+        self.overlay.is_some() || self.inspector.is_typing()
     }
 
     /// Returns the values of the probed pixel; `None` without a probe, or before the session has

@@ -42,7 +42,7 @@ pub struct ViewedImage {
     pub sent: f64,
 }
 
-/// List of commands, kinds or values, from which the user picks one. Fuzzy search filters it.
+/// List of commands, kinds or values, from which the user picks one. A search filters it.
 #[derive(Clone, Debug)]
 pub struct Pick {
     pub title: String,
@@ -53,6 +53,8 @@ pub struct Pick {
     pub found: Vec<usize>,
     /// Cursor in `found`.
     pub at: ListCursor,
+    /// `true` if the text may also be a command, such as `set roughness 0.3`.
+    pub takes_commands: bool,
     /// Function that is called with the name of the picked entry.
     pub(super) take: fn(&mut UpdateContext<'_>, &str),
 }
@@ -64,11 +66,19 @@ pub struct PickEntry {
     pub note: String,
     /// Keys of a command; empty for other entries.
     pub keys: String,
+    /// Other words by which the search finds the entry.
+    pub also: String,
 }
 
 impl From<Word> for PickEntry {
     fn from(Word { name, doc }: Word) -> Self {
-        Self { name, note: doc, keys: String::new() }
+        Self::new(name, &doc)
+    }
+}
+
+impl PickEntry {
+    pub fn new(name: String, note: &str) -> Self {
+        Self { name, note: note.to_string(), keys: String::new(), also: String::new() }
     }
 }
 

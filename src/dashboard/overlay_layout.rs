@@ -1,8 +1,10 @@
 //! Layout of overlays and of rows in panels, shared by drawing and mouse handling.
 
 use crate::dashboard::noise_targets::ABOUT;
-use crate::dashboard::text::wrapped_rows;
-use crate::dashboard::{BORDER, Focus, Form, Layout, Model, Overlay};
+use crate::dashboard::text::{columns, wrapped_rows};
+use crate::dashboard::{
+    BORDER, FieldList, Focus, Form, Layout, Model, Overlay, PanelLine, PickEntry,
+};
 use ratatui::layout::Rect;
 use zerkalo_render::session::QUALITIES;
 
@@ -24,9 +26,9 @@ impl Model {
     pub fn overlay_layout(&self) -> Option<OverlayLayout> {
         let layout = self.layout()?;
         let [width, height] = self.screen;
-        let centred = |columns: u16, rows: u16| {
+        let centred = |wide: u16, rows: u16| {
             // Status line and hint line stay visible.
-            let (columns, rows) = (columns.min(width - 2), rows.min(height - 2));
+            let (columns, rows) = (wide.min(width - 2), rows.min(height - 2));
             let [x, y] = [(width - columns) / 2, (height - 2 - rows) / 2];
             Rect { x, y, width: columns, height: rows }
         };
@@ -47,7 +49,13 @@ impl Model {
                 OverlayLayout { frame, input: Rect::default(), list, help }
             }
             Overlay::Pick(pick) => {
-                let frame = centred(84, (pick.entries.len() as u16).saturating_add(3));
+                // Descriptions are cut only where there is no room for them.
+                let widest = |of: fn(&PickEntry) -> &str| {
+                    pick.entries.iter().map(|entry| columns(of(entry))).max().unwrap_or(0)
+                };
+                let wide = widest(|e| &e.name) + widest(|e| &e.note) + widest(|e| &e.keys) + 12;
+                let rows = (pick.entries.len() as u16).saturating_add(3);
+                let frame = centred(u16::try_from(wide).unwrap_or(width).clamp(84, 160), rows);
                 let (input, list) = divided(frame.inner(BORDER), 1);
                 OverlayLayout { frame, input, list, help: Rect::default() }
             }
@@ -79,7 +87,7 @@ impl Model {
         let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
         let columns = side.min(width);
         let frame = Rect { x: width - columns, y: 0, width: columns, height: height - 2 };
-        let (list, help) = split(frame.inner(BORDER), form.fields.problem().is_some());
+        let (list, help) = self.split_fields(frame.inner(BORDER), &form.fields);
         OverlayLayout { frame, input: Rect::default(), list, help }
     }
 
@@ -111,8 +119,22 @@ impl Model {
     /// Returns the area of the inspector's lines, and the area of help on the field under the
     /// cursor. Returns `None` if the inspector is hidden.
     pub fn inspector_rows(&self) -> Option<(Rect, Rect)> {
-        let problem = self.inspector.problem().is_some();
-        self.layout()?.inspector.map(|area| split(area.inner(BORDER), problem))
+        let area = self.layout()?.inspector?;
+        Some(self.split_fields(area.inner(BORDER), &self.inspector))
+    }
+
+    /// Divides the inside of a panel into the lines `list` and help on the line under the cursor,
+    /// which gets rows that the lines do not need.
+    fn split_fields(&self, inner: Rect, list: &FieldList) -> (Rect, Rect) {
+        let (lines, help) = split(inner, list.problem().is_some());
+        let shown = self.field_lines();
+        let field = shown.get(list.cursor).and_then(PanelLine::entry);
+        let width = inner.width.saturating_sub(2);
+        let texts = field.map_or_else(Vec::new, |field| field.help(list.problem()));
+        let needed: u16 = texts.iter().map(|text| wrapped_rows(text, width)).sum();
+        let free = inner.height.saturating_sub(u16::try_from(shown.len()).unwrap_or(u16::MAX));
+        let rows = if help.height == 0 { 0 } else { help.height.max(needed.min(free)) };
+        divided(inner, lines.height + help.height - rows)
     }
 }
 

@@ -1,7 +1,8 @@
 //! Lines of outline, inspector and form as data. `view` draws them, and `update` moves the cursor
 //! over them.
 
-use crate::dashboard::{Form, Model, Overlay};
+use crate::dashboard::search::has_words;
+use crate::dashboard::{FieldList, Form, Model, Overlay};
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Property, Target, Widget, outline as subjects, rows};
 use zerkalo_scene::value::truncated;
@@ -76,7 +77,70 @@ pub struct FieldLine {
     pub value: String,
     /// Linear colour of the swatch beside the value; `None` except on the first line of a colour.
     pub swatch: Option<[f64; 3]>,
+    /// `true` if the line is hidden while the list is folded.
+    pub is_rare: bool,
+    pub act: RowAct,
 }
+
+/// Effect of Enter on a line of the inspector or of a form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RowAct {
+    Edit,
+    /// Accepts the form.
+    Add,
+    /// Shows or hides the rarely used properties.
+    Fold,
+}
+
+impl FieldLine {
+    fn without_property(act: RowAct, label: String) -> Self {
+        Self {
+            subject: Target::Camera,
+            property: Property::default(),
+            component: None,
+            label,
+            value: String::new(),
+            swatch: None,
+            is_rare: false,
+            act,
+        }
+    }
+
+    /// Returns the help on the line: `problem`, or a description and the valid values, with the
+    /// default if the present value is another.
+    pub fn help(&self, problem: Option<&str>) -> Vec<String> {
+        let Property { doc, expected, default, is_default, .. } = &self.property;
+        let texts = match (problem, default) {
+            (Some(problem), _) => vec![problem.to_string()],
+            (None, Some(default)) if !default.is_empty() && !is_default => {
+                vec![doc.to_string(), format!("{expected}; default {default}")]
+            }
+            (None, _) => vec![doc.to_string(), expected.clone()],
+        };
+        texts.into_iter().filter(|text| !text.is_empty()).collect()
+    }
+
+    /// Returns `true` if both lines show the same number or property.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let id = |line: &Self| (line.act, line.component);
+        id(self) == id(other)
+            && self.subject == other.subject
+            && self.property.key == other.property.key
+    }
+}
+
+/// Keys of materials that are used most, in the order of their rows.
+const COMMON: [&str; 9] = [
+    "preset",
+    "roughness",
+    "reflection",
+    "color",
+    "metal",
+    "transmission",
+    "ior",
+    "lobe",
+    "emission",
+];
 
 pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
     let mut lines = Vec::new();
@@ -128,19 +192,49 @@ pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
         Some(Target::Material(name)) => !base.materials.contains_key(&name),
         _ => false,
     };
-    match has_new_material {
+    let what = form.title.strip_prefix("new ").unwrap_or(&form.title);
+    let add = FieldLine::without_property(RowAct::Add, format!("✓ Add {what}"));
+    let mut lines = vec![PanelLine::Entry(Box::new(add))];
+    lines.extend(match has_new_material {
         true => inspector(&form.scene, &form.subject),
         false => fields(&form.scene, &form.subject),
-    }
+    });
+    lines
 }
 
 fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     // A `subject` that no longer exists has no fields.
-    let rows = rows(scene, subject).unwrap_or_default();
+    let mut rows = rows(scene, subject).unwrap_or_default();
+    if let Target::Material(_) = subject {
+        rows.sort_by_key(|row| common(row).unwrap_or(COMMON.len()));
+    }
     rows.into_iter()
         .flat_map(|property| lines_of(subject, property))
         .map(|f| PanelLine::Entry(Box::new(f)))
         .collect()
+}
+
+/// Returns the position of a material's property among the [`COMMON`] ones.
+fn common(row: &Property) -> Option<usize> {
+    COMMON.iter().position(|key| row.key.split('.').next() == Some(*key))
+}
+
+/// Returns the lines that are visible in the state `list`.
+fn visible(lines: Vec<PanelLine>, list: &FieldList) -> Vec<PanelLine> {
+    if let Some(filter) = &list.filter {
+        let is_found = |line: &PanelLine| {
+            line.entry().is_some_and(|field| has_words(&field.label, filter.text()))
+        };
+        return lines.into_iter().filter(is_found).collect();
+    }
+    let is_rare = |line: &&PanelLine| line.entry().is_some_and(|field| field.is_rare);
+    let rare = lines.iter().filter(is_rare).count();
+    let label = if list.unfolded { "▾ fewer".to_string() } else { format!("▸ {rare} more") };
+    let fold = FieldLine::without_property(RowAct::Fold, label);
+    let mut lines = lines;
+    lines.retain(|line| list.unfolded || !is_rare(&line));
+    lines.extend((rare > 0).then(|| PanelLine::Entry(Box::new(fold))));
+    lines
 }
 
 /// Returns the lines of `property` of `subject`: one for each number if the value is a list of
@@ -153,18 +247,22 @@ fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
         label,
         value: zerkalo_scene::value::sanitized(value),
         swatch: property.color.filter(|_| component.unwrap_or(0) == 0),
+        is_rare: matches!(subject, Target::Material(_))
+            && property.is_default
+            && common(&property).is_none(),
+        act: RowAct::Edit,
     };
     if property.components.len() < 2 {
         return vec![line(None, property.label.clone(), &property.value)];
     }
     let names: &[&str] = match (property.widget, property.components.len()) {
-        (Widget::Color, _) => &["red", "green", "blue"],
+        (Widget::Color, _) => &["r", "g", "b"],
         (_, 2) => &["width", "height"],
         _ => &["x", "y", "z"],
     };
     let component_line = |(i, value): (usize, &String)| {
         let name = names.get(i).copied().unwrap_or_default();
-        line(Some(i), format!("{} {name}", property.label), value)
+        line(Some(i), format!("{}.{name}", property.label), value)
     };
     property.components.iter().enumerate().map(component_line).collect()
 }
@@ -172,10 +270,11 @@ fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
 impl Model {
     /// Returns the lines of the open form, or of the inspector.
     pub fn field_lines(&self) -> Vec<PanelLine> {
-        match &self.overlay {
+        let lines = match &self.overlay {
             Some(Overlay::Form(open)) => form(open, self.history.scene()),
             _ => inspector(self.scene(), &self.selection),
-        }
+        };
+        visible(lines, self.field_list())
     }
 }
 
@@ -226,7 +325,7 @@ mod tests {
         assert!(notes.contains(&"lamp/off".to_string()) && notes.contains(&"left/key 1".into()));
         let ball = inspector(&scene, &Target::Object(2));
         let labels: Vec<_> = ball.iter().filter_map(|l| Some(l.entry()?.label.clone())).collect();
-        for label in ["center x", "center z", "radius", "color green", "roughness"] {
+        for label in ["center.x", "center.z", "radius", "color.g", "roughness"] {
             assert!(labels.contains(&label.to_string()), "{labels:?}");
         }
         assert!(ball.contains(&PanelLine::Heading("material red".into())));

@@ -122,11 +122,13 @@ fn camera_stories() -> Vec<Story> {
         selected("frame the selection", BALL, "f", |_, d| {
             target(d) == [0.0, 1.0, 0.0] && eye(d)[2] < 3.0
         }),
-        story("open the aperture", "* *", |_, d| {
+        story("open the aperture", "Alt-o Alt-o", |_, d| {
             let notice = d.notice();
             d.scene().camera.lens_radius() == 0.12 && notice.contains("aperture 0.12")
         }),
-        story("close the aperture", "* * /", |_, d| d.scene().camera.lens_radius() == 0.088),
+        story("close the aperture", "Alt-o Alt-o Alt-c", |_, d| {
+            d.scene().camera.lens_radius() == 0.088
+        }),
         selected("focus on the probe or the selection", BALL, "F", |_, d| {
             d.scene().camera.focus == Some(LensFocus::Point([0.0, 1.0, 0.0]))
         }),
@@ -158,7 +160,7 @@ fn light_and_mirror_stories() -> Vec<Story> {
         story("select the next light", "l", |_, d| d.model.selection == Target::Light(0)),
         story("light brighter", "'", |_, d| lamp(d).intensity > 1.05),
         story("light darker", ";", |_, d| lamp(d).intensity < 0.95),
-        story("light brighter, fine", "Alt-'", |_, d| (1.001..1.05).contains(&lamp(d).intensity)),
+        story("light brighter, fine", "Alt-'", |_, d| (1.04..1.06).contains(&lamp(d).intensity)),
         story("light darker, fine", "Alt-;", |_, d| (0.95..0.999).contains(&lamp(d).intensity)),
         story("light on or off", "L", |_, d| !lamp(d).on),
         story("add a light", "A Enter Enter", |_, d| {
@@ -166,7 +168,7 @@ fn light_and_mirror_stories() -> Vec<Story> {
         }),
         story("mirror rougher", "]", |_, d| mirror(d).roughness > 0.0525),
         story("mirror smoother", ",", |_, d| mirror(d).roughness < 0.0475),
-        story("mirror rougher, fine", "}", |_, d| (0.0501..0.0525).contains(&mirror(d).roughness)),
+        story("mirror rougher, fine", "}", |_, d| (0.0501..0.0535).contains(&mirror(d).roughness)),
         story("mirror smoother, fine", "<", |_, d| (0.0475..0.0499).contains(&mirror(d).roughness)),
         story("mirror reflects more", ")", |_, d| mirror(d).reflection > 0.5),
         story("mirror reflects less", "(", |_, d| mirror(d).reflection < 0.5),
@@ -178,6 +180,9 @@ fn object_stories() -> Vec<Story> {
     vec![
         story("add an object", "a Enter Enter", |_, d| {
             d.scene().objects.len() == 4 && d.model.selection == Target::Object(3)
+        }),
+        selected("mark or unmark the selection", BALL, "V Tab Down V x", |_, d| {
+            d.scene().objects.len() == 1 && d.model.marked.is_empty()
         }),
         selected("duplicate the selection", BALL, "D", |_, d| {
             d.scene().objects.len() == 4 && d.model.selection != BALL
@@ -201,6 +206,15 @@ fn object_stories() -> Vec<Story> {
         selected("move nearer, fine", BALL, "m Up Shift-Down", |_, d| ball(d)[2] < 0.0),
         selected("raise, fine", BALL, "m PageDown Shift-PageUp", |_, d| ball(d)[1] < 1.0),
         selected("lower, fine", BALL, "m PageUp Shift-PageDown", |_, d| ball(d)[1] > 1.0),
+        selected("move by a typed distance", BALL, "m x `.5` Enter", |_, d| {
+            ball(d) == [0.5, 1.0, 0.0] && d.model.mode == Mode::Orbit
+        }),
+        selected("move by a typed distance", BALL, "m `-1 0 2` Enter", |_, d| {
+            ball(d) == [-1.0, 1.0, 2.0]
+        }),
+        selected("rotate by a typed angle", GLASS, "r `90` Enter", |_, d| {
+            normal(d) == [1.0, 0.0, 0.0]
+        }),
         selected("rotate the selection", GLASS, "r", |_, d| d.model.mode == Mode::Rotate),
         selected("rotate left", GLASS, "r Left", |_, d| normal(d)[0] < -0.2),
         selected("rotate right", GLASS, "r Right", |_, d| normal(d)[0] > 0.2),
@@ -227,10 +241,14 @@ fn object_stories() -> Vec<Story> {
 
 fn panel_stories() -> Vec<Story> {
     vec![
-        story("next panel or field", "Tab", |_, d| d.model.focus == Focus::Outline),
-        story("previous panel or field", "Shift-Tab", |_, d| d.model.focus == Focus::Inspector),
+        story("next panel, or complete, or next group of fields", "Tab", |_, d| {
+            d.model.focus == Focus::Outline
+        }),
+        story("previous panel or group of fields", "Shift-Tab", |_, d| {
+            d.model.focus == Focus::Inspector
+        }),
         selected("leave, back to the picture", BALL, "m Esc", |_, d| d.model.mode == Mode::Orbit),
-        selected("inspect, type a value, choose", BALL, "Enter", |_, d| {
+        selected("inspect, edit, confirm, choose", BALL, "Enter", |_, d| {
             d.model.focus == Focus::Inspector
         }),
         story("line below", "Tab Down", |_, d| d.model.selection == Target::View("v1".into())),
@@ -252,6 +270,15 @@ fn panel_stories() -> Vec<Story> {
         story("reset the field to its default", "Enter `7` Enter Down Backspace", |_, d| {
             eye(d) == [0.0, 1.0, 5.0]
         }),
+        story("find a field or a part of the scene", "/ `gla` Enter", |_, d| {
+            d.model.selection == GLASS
+        }),
+        selected(
+            "find a field or a part of the scene",
+            GLASS,
+            "Enter / `rou` Enter `.2` Enter",
+            |_, d| mirror(d).roughness == 0.2,
+        ),
         story("only the picture", "z", |_, d| {
             d.model.fullscreen && d.model.layout().unwrap().outline.is_none()
         }),
@@ -261,6 +288,7 @@ fn panel_stories() -> Vec<Story> {
 fn file_stories() -> Vec<Story> {
     vec![
         story("undo", "Enter Right u", |a, d| d.scene() == a && !d.model.is_unsaved()),
+        story("list the undo steps", "] } = Alt-u Home Enter", |a, d| d.scene() == a),
         story("redo", "Enter Left u U", |_, d| eye(d)[0] < 0.0),
         story("save", "Enter `7` Enter Ctrl-s", |_, d| {
             d.disk[Path::new(FILE)] == room_with_views().replacen("eye = [0.0", "eye = [7.0", 1)
@@ -310,7 +338,7 @@ fn picture_stories() -> Vec<Story> {
         story("next view: noise, samples, objects, …", "v", |_, d| {
             d.model.channel == DisplayChannel::Noise
         }),
-        story("view before", "V", |_, d| d.model.channel == DisplayChannel::Depth),
+        story("view before", "Alt-v", |_, d| d.model.channel == DisplayChannel::Depth),
         story("zoom in", "Z", |_, d| d.model.zoom.is_some_and(|zoom| zoom.steps == 1)),
         story("zoom out", "Z Z X", |_, d| d.model.zoom.is_some_and(|zoom| zoom.steps == 1)),
         story("zoom fits: the whole picture", "Z Alt-0", |_, d| d.model.zoom.is_none()),
@@ -355,8 +383,11 @@ fn picture_stories() -> Vec<Story> {
             d.model.stop.noise_levels == Some(0.25) && d.model.overlay.is_none()
         }),
         story("next colour mode of the terminal", "#", |_, d| d.model.colors == Colors::Indexed),
+        story("find an action, field or part", ": `mirror sm` Enter", |_, d| {
+            mirror(d).roughness < 0.0475
+        }),
         story(
-            "find an action or its keys",
+            "keys that work here",
             "?",
             |_, d| matches!(&d.model.overlay, Some(Overlay::Pick(pick)) if pick.entries.len() == COMMANDS.len()),
         ),

@@ -21,7 +21,7 @@ fn radius(desk: &Desk) -> f64 {
 
 /// Opens the inspector of a ball, with the cursor on the radius of the ball.
 fn at_radius() -> Desk {
-    let desk = desk(BALL, "Enter Down Down Down Down Down Down");
+    let desk = desk(BALL, "Enter / `rad` Enter");
     let lines = desk.model.field_lines();
     assert_eq!(lines[desk.model.inspector.cursor].entry().unwrap().label, "radius");
     desk
@@ -71,7 +71,7 @@ fn typed_value_is_applied_before_another_command() {
     assert_eq!(radius(&desk), 0.25);
     let mut desk = at_radius();
     desk.keys("`0.25` Tab");
-    assert_eq!((radius(&desk), desk.model.focus), (0.25, Focus::Picture));
+    assert_eq!((radius(&desk), desk.model.focus), (0.25, Focus::Inspector));
     let mut desk = at_radius();
     desk.keys("`-3` Ctrl-s");
     assert!(desk.problem().is_some() && !desk.asked(|e| matches!(e, Effect::Save { .. })));
@@ -89,13 +89,13 @@ fn vector_or_colour_can_be_typed_into_any_component() {
 
 #[test]
 fn choices_are_selected_from_list_or_stepped() {
-    let mut desk = desk(BALL, "Enter Down Enter");
+    let mut desk = desk(BALL, "Enter Enter");
     assert!(
         matches!(&desk.model.overlay, Some(Overlay::Pick(pick)) if pick.entries[0].name == "mirror")
     );
     desk.keys("m Enter");
     assert_eq!(desk.scene().objects[1].material, "mirror");
-    desk.keys("u Right");
+    desk.keys("u Up Right");
     assert_ne!(desk.scene().objects[1].material, "red");
     desk.select(Target::Light(0));
     desk.keys("End Enter");
@@ -108,11 +108,10 @@ fn form_previews_and_confirms_as_one_step() {
     assert_eq!(desk.scene().objects.len(), 4, "it is seen while the form is open");
     assert!(matches!(desk.effects.last(), Some(Effect::Show(s)) if s.objects.len() == 4));
     assert_eq!(desk.text(), ROOM, "but not there yet");
-    // Name, material, shape, center x y z, radius.
-    desk.keys("`pearl` Enter Down Down Down Down Down `0.2` Enter");
+    desk.keys("Down `pearl` Enter `rad` Enter `0.2` Enter");
     let Some(Overlay::Form(form)) = &desk.model.overlay else { panic!("the form has closed") };
     assert_eq!(form.scene.objects[3].name, "pearl");
-    desk.keys("Enter");
+    desk.keys("Home Enter");
     assert!(desk.model.overlay.is_none());
     let Shape::Sphere(sphere) = &desk.scene().objects[3].shape else { panic!() };
     assert_eq!((sphere.radius, desk.scene().materials.len()), (0.2, 3));
@@ -124,7 +123,7 @@ fn form_previews_and_confirms_as_one_step() {
 #[test]
 fn form_cancels_as_a_whole() {
     for kind in 0..8 {
-        for keys in ["Esc", "Down Right Right Esc", "`x` Esc Esc", "`-1` Enter Esc Esc"] {
+        for keys in ["Esc", "Down Right Right Esc", "`x` Esc Esc", "Down `-1` Enter Esc Esc"] {
             let downs = "Down ".repeat(kind);
             let mut desk = desk(BALL, &format!("a {downs} Enter {keys}"));
             assert!(desk.model.overlay.is_none(), "kind {kind}: {keys}");
@@ -139,23 +138,23 @@ fn form_cancels_as_a_whole() {
 
 #[test]
 fn form_removes_unused_materials() {
-    let mut desk = desk(Target::Camera, "a Enter Down");
+    let mut desk = desk(Target::Camera, "a Enter Down Down");
     for _ in 0..3 {
         desk.keys("Right");
         if desk.scene().objects[3].material == "red" {
             break;
         }
     }
-    desk.keys("Enter");
+    desk.keys("Home Enter");
     assert_eq!(desk.scene().objects[3].material, "red");
     assert_eq!(desk.scene().materials.len(), 2, "its own colour is not used");
 }
 
 #[test]
 fn invalid_value_stays_in_form() {
-    let mut desk = desk(Target::Camera, "a Enter End Home `ball` Enter");
+    let mut desk = desk(Target::Camera, "a Enter Down `ball` Enter");
     assert!(desk.problem().is_some_and(|p| p.contains("same name")), "{:?}", desk.problem());
-    desk.keys("Backspace `2` Enter Enter");
+    desk.keys("Backspace `2` Enter Home Enter");
     assert_eq!(desk.scene().objects[3].name, "bal2");
 }
 

@@ -11,6 +11,7 @@ mod recovery;
 mod roughness;
 mod simulated_dashboard;
 mod table;
+mod typing;
 mod view;
 mod watch;
 mod zoom;

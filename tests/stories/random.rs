@@ -24,7 +24,7 @@ fn keys() -> Vec<Key> {
     let bindings = COMMANDS.iter().flat_map(|command| command.keys);
     let names = bindings.flat_map(|(_, names)| names.split(' '));
     let mut keys: Vec<Key> = names.map(|name| name.parse().unwrap()).collect();
-    for c in "0123456789.-#eyxñ鏡 ".chars() {
+    for c in "0123456789.-#/eyxñ鏡 ".chars() {
         keys.push(Key { code: Code::Char(c), ctrl: false, alt: false, shift: false });
     }
     keys
@@ -32,7 +32,9 @@ fn keys() -> Vec<Key> {
 
 fn quits(desk: &Desk, key: Key) -> bool {
     lookup(desk.model.context(), key).is_some_and(|c| c.label == QUIT)
-        || key.code == Code::Enter && desk.picked_command() == Some(QUIT)
+        || key.code == Code::Enter
+            && (desk.picked_command() == Some(QUIT)
+                || desk.editor().is_some_and(|e| ["q", "wq", "q!"].contains(&e.text())))
 }
 
 fn event(desk: &mut Desk, rng: &mut Rng, keys: &[Key]) {

@@ -315,7 +315,10 @@ impl Desk {
         match &self.model.overlay {
             Some(Overlay::Pick(pick)) => Some(&pick.editor),
             Some(Overlay::Prompt(prompt)) => Some(&prompt.editor),
-            None | Some(Overlay::Form(_)) => self.model.field_list().editor.as_ref(),
+            None | Some(Overlay::Form(_)) => {
+                let list = self.model.field_list();
+                list.filter.as_ref().or(list.editor.as_ref())
+            }
             Some(_) => None,
         }
     }

@@ -92,6 +92,14 @@ impl History {
         Some(label)
     }
 
+    /// Returns the labels of the steps that can be undone, the oldest first, and of those that can
+    /// be redone, the next first.
+    pub fn labels(&self) -> (Vec<&str>, Vec<&str>) {
+        let past = self.past.iter().map(|entry| entry.label.as_str());
+        let future = self.future.iter().rev().map(|entry| entry.label.as_str());
+        (past.collect(), future.collect())
+    }
+
     /// Records that `scene`, the current or an earlier one, has been written to the file.
     pub fn mark_saved(&mut self, scene: Arc<Scene>) {
         self.saved = scene;

@@ -152,7 +152,11 @@ fn lens(camera: &Camera) -> String {
     let aperture = match camera.aperture {
         Some(Aperture::FNumber(f)) => format!("f/{}", number(f)),
         Some(Aperture::Radius(radius)) if radius > 0.0 => format!("aperture {}", number(radius)),
-        _ => return format!("focus at {distance} · pinhole, all in focus · * opens the aperture"),
+        _ => {
+            return format!(
+                "focus at {distance} · pinhole, all in focus · Alt-o opens the aperture"
+            );
+        }
     };
-    format!("focus at {distance} · {aperture} · / * close, open · right click focuses")
+    format!("focus at {distance} · {aperture} · Alt-c Alt-o close, open · right click focuses")
 }

@@ -43,6 +43,8 @@ pub struct Command {
     /// Contexts with the names of the keys there, separated by spaces. A command without keys runs
     /// only from the command palette.
     pub keys: &'static [(KeyContext, &'static str)],
+    /// Other words by which the palette finds the command.
+    pub also: &'static str,
     /// Hints, which may also describe related commands.
     pub hints: &'static [Hint],
     /// Function that returns `true` if the command can run.
@@ -56,7 +58,7 @@ const fn command(
     keys: &'static [(KeyContext, &'static str)],
     run: fn(&mut UpdateContext<'_>),
 ) -> Command {
-    Command { chapter, label, keys, hints: &[], available: editing, run }
+    Command { chapter, label, keys, also: "", hints: &[], available: editing, run }
 }
 
 const fn hint(
@@ -95,12 +97,12 @@ fn always(_: &Model) -> bool {
 /// All commands, in the order of the command palette.
 #[rustfmt::skip] // One line per row keeps the table readable.
 pub static COMMANDS: &[Command] = &[
-    command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit_or_pan(LEFT)).hints(&[hint(&[H::First, H::In(Picture)], 1, "arrows", "orbit")]),
+    command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit_or_pan(LEFT)).also("turn rotate").hints(&[hint(&[H::First, H::In(Picture)], 1, "arrows", "orbit")]),
     command("camera", "orbit right", &[(Picture, "Right")], |c| c.orbit_or_pan(RIGHT)),
     command("camera", "orbit up", &[(Picture, "Up")], |c| c.orbit_or_pan(UP)),
     command("camera", "orbit down", &[(Picture, "Down")], |c| c.orbit_or_pan(DOWN)),
-    command("camera", "dolly in", &[(Picture, "PageUp")], |c| c.dolly(1.0)).hints(&[hint(&[H::In(Picture)], 2, "PgUp PgDn", "dolly")]),
-    command("camera", "dolly out", &[(Picture, "PageDown")], |c| c.dolly(-1.0)),
+    command("camera", "dolly in", &[(Picture, "PageUp")], |c| c.dolly(1.0)).also("zoom closer").hints(&[hint(&[H::In(Picture)], 2, "PgUp PgDn", "dolly")]),
+    command("camera", "dolly out", &[(Picture, "PageDown")], |c| c.dolly(-1.0)).also("zoom farther"),
     command("camera", "dolly in, fine", &[(Picture, "Shift-PageUp")], |c| c.dolly(0.1)),
     command("camera", "dolly out, fine", &[(Picture, "Shift-PageDown")], |c| c.dolly(-0.1)),
     command("camera", "pan left", &[(Picture, "Shift-Left")], |c| c.pan(LEFT)).hints(&[hint(&[H::In(Picture)], 3, "Shift", "pan")]),
@@ -113,8 +115,8 @@ pub static COMMANDS: &[Command] = &[
     command("camera", "look down", &[(Picture, "Ctrl-Down"), (Flying, "Down")], |c| c.look(DOWN)),
     command("camera", "roll left", &[(Picture, "Alt-Left")], |c| c.roll(LEFT)),
     command("camera", "roll right", &[(Picture, "Alt-Right")], |c| c.roll(RIGHT)),
-    command("camera", "narrower view angle", &[(Picture, "Alt-Up")], |c| c.view_angle(-1)),
-    command("camera", "wider view angle", &[(Picture, "Alt-Down")], |c| c.view_angle(1)),
+    command("camera", "narrower view angle", &[(Picture, "Alt-Up")], |c| c.view_angle(-1)).also("zoom fov lens"),
+    command("camera", "wider view angle", &[(Picture, "Alt-Down")], |c| c.view_angle(1)).also("zoom fov lens"),
     command("camera", "fly the camera", &[(Anywhere, "w")], |c| c.enter_mode(Mode::Fly)),
     command("camera", "fly forward", &[(Flying, "w")], |c| c.fly(FORWARD)).hints(&[hint(&[H::In(Flying)], 1, "w s", "forward, back")]),
     command("camera", "fly back", &[(Flying, "s")], |c| c.fly(BACK)),
@@ -125,31 +127,32 @@ pub static COMMANDS: &[Command] = &[
     command("camera", "frame the selection", &[(Anywhere, "f")], |c| c.frame()).hints(&[hint(&[H::In(Outline)], 6, "f", "frame")]),
     command("camera", "back to the camera of the scene", &[(Anywhere, "h"), (Picture, "Home")], |c| c.leave_view()),
     command("camera", "make this view the camera", &[(Anywhere, "H")], |c| c.keep_view()),
-    command("camera", "open the aperture", &[(Anywhere, "*")], |c| c.aperture(1.0)),
-    command("camera", "close the aperture", &[(Anywhere, "/")], |c| c.aperture(-1.0)),
+    command("camera", "open the aperture", &[(Anywhere, "Alt-o")], |c| c.aperture(1.0)).also("blur depth lens"),
+    command("camera", "close the aperture", &[(Anywhere, "Alt-c")], |c| c.aperture(-1.0)),
     command("camera", "focus on the probe or the selection", &[(Anywhere, "F")], |c| c.focus()),
     command("camera", "store this viewpoint", &[(Anywhere, "n")], |c| c.ask_view_name()),
-    command("camera", "go to viewpoint 1 to 9", &[(Anywhere, "1 2 3 4 5 6 7 8 9")], |c| c.recall_view()),
+    command("camera", "go to viewpoint 1 to 9", &[(Picture, "1 2 3 4 5 6 7 8 9")], |c| c.recall_view()),
 
     command("light", "select the next light", &[(Anywhere, "l")], |c| c.next_light()).hints(&[hint(&[H::In(Picture)], 5, "l ; '", "light")]),
-    command("light", "light brighter", &[(Anywhere, "'")], |c| c.intensity(1.0)),
+    command("light", "light brighter", &[(Anywhere, "'")], |c| c.intensity(1.0)).also("intensity"),
     command("light", "light darker", &[(Anywhere, ";")], |c| c.intensity(-1.0)),
     command("light", "light brighter, fine", &[(Anywhere, "Alt-'")], |c| c.intensity(0.1)),
     command("light", "light darker, fine", &[(Anywhere, "Alt-;")], |c| c.intensity(-0.1)),
     command("light", "light on or off", &[(Anywhere, "L")], |c| c.switch_light()),
     command("light", "add a light", &[(Anywhere, "A")], |c| c.pick_light()),
 
-    command("mirror", "mirror rougher", &[(Anywhere, "] .")], |c| c.step_mirror("roughness", 1.0)).hints(&[hint(&[H::First, H::In(Picture)], 4, "[ ]", "roughness")]),
-    command("mirror", "mirror smoother", &[(Anywhere, "[ ,")], |c| c.step_mirror("roughness", -1.0)),
-    command("mirror", "mirror rougher, fine", &[(Anywhere, "} >")], |c| c.step_mirror("roughness", 0.1)),
-    command("mirror", "mirror smoother, fine", &[(Anywhere, "{ <")], |c| c.step_mirror("roughness", -0.1)),
-    command("mirror", "mirror reflects more", &[(Anywhere, ")")], |c| c.step_mirror("reflection", 1.0)),
-    command("mirror", "mirror reflects less", &[(Anywhere, "(")], |c| c.step_mirror("reflection", -1.0)),
-    command("mirror", "next lobe of the mirror", &[(Anywhere, "b \\")], |c| c.step_mirror("lobe", 1.0)),
+    command("mirror", "mirror rougher", &[(Anywhere, "]"), (Picture, ".")], |c| c.step_mirror("roughness", 1.0)).also("blur glossy").hints(&[hint(&[H::First, H::In(Picture)], 4, "[ ]", "roughness")]),
+    command("mirror", "mirror smoother", &[(Anywhere, "["), (Picture, ",")], |c| c.step_mirror("roughness", -1.0)).also("crisp sharp"),
+    command("mirror", "mirror rougher, fine", &[(Anywhere, "}"), (Picture, ">")], |c| c.step_mirror("roughness", 0.1)),
+    command("mirror", "mirror smoother, fine", &[(Anywhere, "{"), (Picture, "<")], |c| c.step_mirror("roughness", -0.1)),
+    command("mirror", "mirror reflects more", &[(Picture, ")")], |c| c.step_mirror("reflection", 1.0)),
+    command("mirror", "mirror reflects less", &[(Picture, "(")], |c| c.step_mirror("reflection", -1.0)),
+    command("mirror", "next lobe of the mirror", &[(Picture, "b \\")], |c| c.step_mirror("lobe", 1.0)).also("ggx beckmann cone"),
 
     command("objects", "add an object", &[(Anywhere, "a")], |c| c.pick_object()).hints(&[hint(&[H::First, H::In(Picture)], 6, "a", "add")]),
+    command("objects", "mark or unmark the selection", &[(Anywhere, "V")], |c| c.toggle_mark()).also("multi select several group").hints(&[hint(&[H::In(Outline)], 11, "V", "mark")]),
     command("objects", "duplicate the selection", &[(Anywhere, "D")], |c| c.duplicate()).hints(&[hint(&[H::In(Outline)], 4, "D", "duplicate")]),
-    command("objects", "delete the selection", &[(Anywhere, "x Delete")], |c| c.delete()).hints(&[hint(&[H::In(Outline)], 5, "x", "delete")]),
+    command("objects", "delete the selection", &[(Anywhere, "x Delete")], |c| c.delete()).hints(&[hint(&[H::In(Outline)], 10, "x", "delete")]),
     command("objects", "rename the selection", &[(Anywhere, "e F2")], |c| c.ask_name()).hints(&[hint(&[H::In(Outline)], 3, "e", "rename")]),
     command("objects", "move the selection", &[(Anywhere, "m")], |c| c.enter_mode(Mode::Move)).hints(&[hint(&[H::First, H::In(Picture), H::In(Outline)], 7, "m", "move")]),
     command("objects", "move left", &[(Moving, "Left")], |c| c.move_selection(LEFT, 1.0)).hints(&[hint(&[H::In(Moving)], 1, "arrows", "in plane")]),
@@ -164,31 +167,33 @@ pub static COMMANDS: &[Command] = &[
     command("objects", "move nearer, fine", &[(Moving, "Shift-Down")], |c| c.move_selection(BACK, 0.1)),
     command("objects", "raise, fine", &[(Moving, "Shift-PageUp")], |c| c.move_selection(UP, 0.1)),
     command("objects", "lower, fine", &[(Moving, "Shift-PageDown")], |c| c.move_selection(DOWN, 0.1)),
+    command("objects", "move by a typed distance", &[(Moving, "x y z 0 1 2 3 4 5 6 7 8 9 - .")], |c| c.ask_move()).hints(&[hint(&[H::In(Moving)], 5, "x y z", "type a distance")]),
     command("objects", "rotate the selection", &[(Anywhere, "r")], |c| c.enter_mode(Mode::Rotate)),
     command("objects", "rotate left", &[(Rotating, "Left")], |c| c.rotate_selection(-15.0)).hints(&[hint(&[H::In(Rotating)], 1, "Left Right", "rotate 15°")]),
     command("objects", "rotate right", &[(Rotating, "Right")], |c| c.rotate_selection(15.0)),
     command("objects", "rotate left, fine", &[(Rotating, "Shift-Left")], |c| c.rotate_selection(-1.0)).hints(&[hint(&[H::In(Rotating)], 2, "Shift", "1°")]),
     command("objects", "rotate right, fine", &[(Rotating, "Shift-Right")], |c| c.rotate_selection(1.0)),
+    command("objects", "rotate by a typed angle", &[(Rotating, "0 1 2 3 4 5 6 7 8 9 - .")], |c| c.ask_angle()).hints(&[hint(&[H::In(Rotating)], 3, "0-9", "type degrees")]),
     command("objects", "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
     command("objects", "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
     command("objects", "make the selection gold, glass, …", &[(Anywhere, "S")], |c| c.pick_preset()).hints(&[hint(&[H::In(Outline)], 8, "S", "gold, glass …")]),
     command("objects", "remove unused materials", &[], |c| c.purge_materials()),
 
-    command("panels", "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).available(viewing).hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
-    command("panels", "previous panel or field", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).available(viewing),
+    command("panels", "next panel, or complete, or next group of fields", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).available(viewing).hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
+    command("panels", "previous panel or group of fields", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).available(viewing),
     command("panels", "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Rotating, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).available(always).hints(&[
         hint(&[H::In(Moving), H::In(Rotating), H::In(Flying), H::In(Probing)], 9, "Esc", "done"),
         hint(&[H::In(Outline), H::In(Inspector)], 9, "Esc", "picture"),
         hint(&[H::List, H::Form], 9, "Esc", "cancel"),
         hint(&[H::Typing], 9, "Esc", "leave as it was"),
     ]),
-    command("panels", "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).hints(&[
+    command("panels", "inspect, edit, confirm, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).hints(&[
         hint(&[H::In(Outline)], 2, "Enter", "inspect"),
         hint(&[H::In(Inspector)], 4, "Enter 0-9", "type"),
         hint(&[H::List], 2, "Enter", "take"),
-        hint(&[H::Form], 3, "type", "a value"),
-        hint(&[H::Form], 4, "Enter", "add"),
-        hint(&[H::Typing], 1, "Enter", "apply"),
+        hint(&[H::Form], 3, "Enter", "edit"),
+        hint(&[H::Typing], 1, "Enter", "confirm"),
+        hint(&[H::Typing], 2, "*2 /2 +.1 -=.1", "change a number"),
     ]),
     command("panels", "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).available(always).hints(&[
         hint(&[H::In(Outline)], 1, "Up Down", "select"),
@@ -199,32 +204,34 @@ pub static COMMANDS: &[Command] = &[
     command("panels", "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).available(always),
     command("panels", "page up", &[(Outline, "PageUp"), (Inspector, "PageUp"), (Overlay, "PageUp")], |c| c.page(-1)).available(always),
     command("panels", "page down", &[(Outline, "PageDown"), (Inspector, "PageDown"), (Overlay, "PageDown")], |c| c.page(1)).available(always),
-    command("panels", "first line", &[(Outline, "Home"), (Inspector, "Home"), (Overlay, "Home")], |c| c.move_cursor(isize::MIN / 2)).available(always),
+    command("panels", "first line", &[(Outline, "Home"), (Inspector, "Home"), (Overlay, "Home")], |c| c.move_cursor(isize::MIN / 2)).available(always).hints(&[hint(&[H::Form], 4, "Home Enter", "add")]),
     command("panels", "last line", &[(Outline, "End"), (Inspector, "End"), (Overlay, "End")], |c| c.move_cursor(isize::MAX / 2)).available(always),
     command("panels", "field up", &[(Inspector, "Right"), (Overlay, "Right")], |c| c.step_field(1.0)).hints(&[hint(&[H::In(Inspector), H::Form], 2, "Left Right", "step")]),
     command("panels", "field down", &[(Inspector, "Left"), (Overlay, "Left")], |c| c.step_field(-1.0)),
     command("panels", "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::In(Inspector)], 3, "Shift", "fine")]),
     command("panels", "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
-    command("panels", "reset the field to its default", &[(Inspector, "Backspace")], |c| c.fill_field("")).hints(&[hint(&[H::In(Inspector)], 5, "Backspace", "default")]),
+    command("panels", "reset the field to its default", &[(Inspector, "Backspace")], |c| c.fill_field("")).hints(&[hint(&[H::In(Inspector)], 6, "Backspace", "default")]),
+    command("panels", "find a field or a part of the scene", &[(Anywhere, "/")], |c| c.find()).also("search").hints(&[hint(&[H::In(Outline), H::In(Inspector)], 5, "/", "find"), hint(&[H::Form], 5, "letters /", "find")]),
     command("panels", "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).available(viewing),
 
     command("file", "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::In(Picture)], 9, "u", "undo")]),
     command("file", "redo", &[(Anywhere, "U Ctrl-r")], |c| c.redo()),
-    command("file", "save", &[(Anywhere, "Ctrl-s")], |c| c.save()),
+    command("file", "list the undo steps", &[(Anywhere, "Alt-u")], |c| c.list_steps()).also("history"),
+    command("file", "save", &[(Anywhere, "Ctrl-s"), (Overlay, "Ctrl-s")], |c| c.save()),
     command("file", "save as", &[(Anywhere, "W")], |c| c.ask_path()),
     command("file", "new scene", &[(Anywhere, "Ctrl-n")], |c| c.open_scene(SceneSource::New)).available(not_watching),
     command("file", "open another scene", &[(Anywhere, "O")], |c| c.emit(Effect::ListScenes)).available(not_watching),
-    command("file", "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(not_watching),
+    command("file", "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).also("reload revert").available(not_watching),
     command("file", "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(not_watching),
     command("file", "write a checkpoint to continue later", &[(Anywhere, "K")], |c| c.checkpoint()),
     command("file", "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).available(always),
     command("file", "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).available(always).hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
 
-    command("picture", "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).available(viewing).hints(&[hint(&[H::In(Picture), H::Watching], 10, "p", "PNG")]),
-    command("picture", "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).available(viewing).hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
-    command("picture", "view the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).available(viewing),
+    command("picture", "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).also("export image render").available(viewing).hints(&[hint(&[H::In(Picture), H::Watching], 10, "p", "PNG")]),
+    command("picture", "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).also("export image render").available(viewing).hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
+    command("picture", "view the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).also("image show").available(viewing),
     command("picture", "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()).available(viewing),
-    command("picture", "render at another size", &[(Anywhere, "Ctrl-e")], |c| c.ask_export_size()),
+    command("picture", "render at another size", &[(Anywhere, "Ctrl-e")], |c| c.ask_export_size()).also("export image resolution"),
     command("picture", "cancel the running export", &[(Anywhere, "Ctrl-x")], |c| c.cancel_export()),
     command("picture", "exposure up", &[(Anywhere, "= +")], |c| c.exposure(1.0)).available(viewing),
     command("picture", "exposure down", &[(Anywhere, "-")], |c| c.exposure(-1.0)).available(viewing),
@@ -232,7 +239,7 @@ pub static COMMANDS: &[Command] = &[
     command("picture", "exposure from the picture", &[(Anywhere, "E")], |c| c.expose()).available(viewing),
     command("picture", "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()).available(viewing),
     command("picture", "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).available(viewing).hints(&[hint(&[H::In(Probing), H::Watching], 3, "v", "views")]),
-    command("picture", "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)).available(viewing),
+    command("picture", "view before", &[(Anywhere, "Alt-v")], |c| c.next_channel(-1)).available(viewing),
     command("picture", "zoom in", &[(Anywhere, "Z Alt-=")], |c| c.zoom(1, None)).available(viewing),
     command("picture", "zoom out", &[(Anywhere, "X Alt--")], |c| c.zoom(-1, None)).available(viewing),
     command("picture", "zoom fits: the whole picture", &[(Anywhere, "Alt-0")], |c| c.zoom_fits()).available(viewing),
@@ -247,26 +254,30 @@ pub static COMMANDS: &[Command] = &[
     command("picture", "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe_by_pixel(RIGHT)).available(viewing),
     command("picture", "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe_by_pixel(UP)).available(viewing),
     command("picture", "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe_by_pixel(DOWN)).available(viewing),
-    command("picture", "pin this picture", &[(Anywhere, "k")], |c| c.emit(Effect::Pin)).available(viewing).hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
-    command("picture", "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(DisplayChannel::Pinned)).available(viewing),
-    command("picture", "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(DisplayChannel::Difference)).available(viewing),
+    command("picture", "pin this picture", &[(Anywhere, "k")], |c| c.emit(Effect::Pin)).also("compare keep").available(viewing).hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
+    command("picture", "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(DisplayChannel::Pinned)).also("compare").available(viewing),
+    command("picture", "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(DisplayChannel::Difference)).also("compare").available(viewing),
 
     command("rendering", "pause or resume", &[(Anywhere, "Space")], |c| c.pause()),
     command("rendering", "restart the picture", &[(Anywhere, "R")], |c| c.restart()),
-    command("rendering", "stop at …", &[(Anywhere, "T")], |c| c.ask_stop()),
-    command("rendering", "noise targets and their times", &[(Anywhere, "N")], |c| c.open_noise_targets()),
-    command("rendering", "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).available(always),
+    command("rendering", "stop at …", &[(Anywhere, "T")], |c| c.ask_stop()).also("samples rays spp time"),
+    command("rendering", "noise targets and their times", &[(Anywhere, "N")], |c| c.open_noise_targets()).also("quality crisp samples rays"),
+    command("rendering", "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).also("settings").available(always),
 
-    command("help", "find an action or its keys", &[(Anywhere, "? F1 : Ctrl-p")], |c| c.pick_command()).available(always).hints(&[
+    command("help", "find an action, field or part", &[(Anywhere, ": Ctrl-p")], |c| c.open_palette()).available(always).hints(&[
         hint(&[H::First], 11, ":", "all actions"),
         hint(&[H::In(Picture)], 11, ":", "all"),
-        hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys"),
     ]),
+    command("help", "keys that work here", &[(Anywhere, "? F1")], |c| c.open_help()).available(always).also("help manual").hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),
 ];
 
 impl Command {
     const fn available(self, available: fn(&Model) -> bool) -> Self {
         Self { available, ..self }
+    }
+
+    const fn also(self, also: &'static str) -> Self {
+        Self { also, ..self }
     }
 
     const fn hints(self, hints: &'static [Hint]) -> Self {

@@ -4,6 +4,7 @@ use crate::dashboard::model::{Tone, file_notice, first_line};
 use crate::dashboard::{
     Answer, Effect, Exported, OpenedScene, PickEntry, SceneSource, UpdateContext, short_name,
 };
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_scene::edit::{Target, outline};
@@ -19,13 +20,31 @@ const LOAD: Answer = ('r', "read the file and lose my edits", |c| c.emit(Effect:
 
 impl UpdateContext<'_> {
     pub(super) fn undo(&mut self) {
+        let before = Arc::clone(self.scene());
         let undone = self.model.history.undo();
+        self.select_new(&before);
         self.report_history_step(undone, "undone", "Nothing to undo");
     }
 
     pub(super) fn redo(&mut self) {
+        let before = Arc::clone(self.scene());
         let redone = self.model.history.redo();
+        self.select_new(&before);
         self.report_history_step(redone, "redone", "Nothing to redo");
+    }
+
+    /// Selects the first part that the scene has and `before` has not.
+    fn select_new(&mut self, before: &Scene) {
+        self.model.marked.clear();
+        let old: HashSet<_> = outline(before).iter().map(|(_, part)| part.title(before)).collect();
+        let scene = Arc::clone(self.scene());
+        let parts = outline(&scene).into_iter().map(|(_, part)| part);
+        let grown = scene.objects.len() + scene.lights.len() + scene.materials.len()
+            > before.objects.len() + before.lights.len() + before.materials.len();
+        let new = parts.into_iter().find(|part| !old.contains(&part.title(&scene)));
+        if let Some(part) = new.filter(|_| grown) {
+            self.select(part);
+        }
     }
 
     fn report_history_step(&mut self, label: Option<String>, what: &str, nothing: &str) {
@@ -136,12 +155,8 @@ impl UpdateContext<'_> {
         if self.model.is_busy() {
             return;
         }
-        let entry = |(name, note): (String, &str)| PickEntry {
-            name,
-            note: note.to_string(),
-            keys: String::new(),
-        };
-        let entries: Vec<_> = scenes.into_iter().map(entry).collect();
+        let entries: Vec<_> =
+            scenes.into_iter().map(|(name, note)| PickEntry::new(name, note)).collect();
         self.open_pick("open a scene", entries, 0, |c, name| c.open_scene_file(name));
     }
 

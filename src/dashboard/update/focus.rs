@@ -2,19 +2,19 @@
 
 use crate::dashboard::update::cycled;
 use crate::dashboard::{DisplayChannel, Focus, Mode, UpdateContext};
-use zerkalo_scene::edit;
+use zerkalo_scene::edit::{self, Target};
 
 impl UpdateContext<'_> {
     /// Enters `mode` and gives the focus to the picture, or reports why the selection cannot be
     /// moved or rotated.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
-        let (scene, selection) = (self.scene(), &self.model.selection);
-        let tried = match mode {
-            Mode::Move => edit::move_by(scene, selection, [0.0; 3]).err(),
-            Mode::Rotate => edit::rotate(scene, selection, 0.0).err(),
+        let scene = self.scene();
+        let tried = |part: &Target| match mode {
+            Mode::Move => edit::move_by(scene, part, [0.0; 3]).err(),
+            Mode::Rotate => edit::rotate(scene, part, 0.0).err(),
             _ => None,
         };
-        if let Some(error) = tried {
+        if let Some(error) = self.model.targets().iter().find_map(tried) {
             self.refuse(&error.to_string());
             return;
         }
@@ -26,12 +26,15 @@ impl UpdateContext<'_> {
     /// Leaves the first of these states that is active: overlay, text editor, mode, focus on
     /// another panel, zoom, full screen, comparison.
     pub(super) fn leave(&mut self) {
-        if self.model.overlay.is_some() {
+        if self.end_filter() {
+        } else if self.model.overlay.is_some() {
             self.close_overlay();
         } else if self.model.inspector.editor.is_some() {
             self.model.inspector.editor = None;
         } else if self.model.mode != Mode::Orbit {
             self.end_mode();
+        } else if !self.model.marked.is_empty() {
+            self.model.marked.clear();
         } else if self.model.focus != Focus::Picture {
             self.model.focus = Focus::Picture;
         } else if self.model.zoom.is_some() {
@@ -54,8 +57,8 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn next_panel(&mut self, by: isize) {
-        if self.model.overlay.is_some() {
-            self.move_cursor(by);
+        if self.model.overlay.is_some() || self.model.inspector.is_typing() {
+            self.complete(by);
             return;
         }
         let panels = match self.model.watch {
@@ -70,15 +73,17 @@ impl UpdateContext<'_> {
             self.end_mode();
             self.model.fullscreen = false;
         }
-        if focus != Focus::Inspector {
-            self.model.inspector.editor = None;
-        }
         self.model.focus = focus;
+        if focus != Focus::Inspector {
+            self.model.inspector.stop_typing();
+        } else {
+            self.skip_text();
+        }
     }
 
     pub(super) fn toggle_fullscreen(&mut self) {
         self.model.fullscreen = !self.model.fullscreen;
         self.model.focus = Focus::Picture;
-        self.model.inspector.editor = None;
+        self.model.inspector.stop_typing();
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::dashboard::update::commands::{Command, lookup};
 use crate::dashboard::{Editor, FieldList, KeyContext, Model, Overlay, UpdateContext};
+use zerkalo_scene::edit::Widget;
 use zerkalo_terminal::event::{Code, Key};
 
 /// Returns the character that `key` types; `None` for all other keys and with Ctrl or Alt.
@@ -18,9 +19,9 @@ impl Model {
         match &mut self.overlay {
             Some(Overlay::Pick(pick)) => Some(&mut pick.editor),
             Some(Overlay::Prompt(prompt)) => Some(&mut prompt.editor),
-            Some(Overlay::Form(form)) => form.fields.editor.as_mut(),
+            Some(Overlay::Form(form)) => form.fields.typing(),
             Some(_) => None,
-            None => self.inspector.editor.as_mut(),
+            None => self.inspector.typing(),
         }
     }
 
@@ -52,21 +53,21 @@ impl UpdateContext<'_> {
             return;
         }
         if let Some(c) = typed(key)
-            && self.typed_in_overlay(c)
+            && self.typed_on_row(c)
         {
             return;
         }
         let Some(command) = lookup(self.model.context(), key) else {
-            if self.model.overlay.is_none() && self.model.inspector.editor.is_none() {
+            if !self.model.is_busy() {
                 self.say(format!("{key} does nothing here · ? all keys"));
             }
             return;
         };
-        // An invalid value that is being typed prevents the command. The commands of Enter and Esc
-        // handle the value themselves.
-        if self.model.overlay.is_none()
-            && self.model.inspector.editor.is_some()
-            && !matches!(key.code, Code::Enter | Code::Esc)
+        // An invalid value that is being typed prevents the command. The commands of Enter, Esc and
+        // Tab handle the value themselves.
+        if matches!(self.model.overlay, None | Some(Overlay::Form(_)))
+            && self.model.field_list().editor.is_some()
+            && !matches!(key.code, Code::Enter | Code::Esc | Code::Tab)
             && !self.apply_field()
         {
             return;
@@ -99,19 +100,36 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Applies `c` to the open form or question. Returns `true` if an overlay is open: the
-    /// character then runs no command.
-    fn typed_in_overlay(&mut self, c: char) -> bool {
+    /// Applies the character `c` to the open question, or to the row of the form or inspector under
+    /// the cursor: it begins a value there, or in a form the words that find another row. Returns
+    /// `false` if the character may run a command.
+    fn typed_on_row(&mut self, c: char) -> bool {
         match &self.model.overlay {
             Some(Overlay::Question(question)) => {
                 let has_letter = |(letter, ..): &(char, _, _)| letter.eq_ignore_ascii_case(&c);
                 if let Some(at) = question.answers.iter().position(has_letter) {
                     self.answer(at);
                 }
+                return true;
             }
-            Some(Overlay::Form(form)) if form.fields.editor.is_none() => self.open_field(Some(c)),
-            Some(_) => {}
+            Some(Overlay::Form(_)) => {}
+            Some(_) => return true,
+            None if self.model.context() == KeyContext::Inspector => {}
             None => return false,
+        }
+        let widget = self.field().map(|field| field.property.widget);
+        let begins_number = "0123456789.-+*#".contains(c);
+        match widget {
+            Some(Widget::Text) if c.is_alphanumeric() => self.type_value(c),
+            Some(Widget::Numbers | Widget::Color) if begins_number => self.type_value(c),
+            _ if begins_number => self.say("This row takes no number · Enter edits it"),
+            _ if !self.in_form() => return false,
+            Some(Widget::Switch | Widget::Choice | Widget::Kind) if c == ' ' => {
+                self.step_field(1.0);
+            }
+            _ if c == '/' => self.open_filter(""),
+            _ if c != ' ' => self.open_filter(c),
+            _ => {}
         }
         true
     }

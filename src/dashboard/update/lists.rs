@@ -1,16 +1,14 @@
 //! Commands that move the cursor and open the entry under it, in panels and overlays.
 
 use crate::dashboard::panel_lines::{outline, outline_position, walked};
-use crate::dashboard::update::commands::{COMMANDS, Command};
+use crate::dashboard::search::rank;
 use crate::dashboard::{
-    Answer, Editor, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
+    Answer, Editor, Focus, KeyContext, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
     UpdateContext,
 };
-use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
-use nucleo_matcher::{Config, Matcher, Utf32Str};
-use std::cmp::Reverse;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
+use zerkalo_scene::edit::{Section, Target, outline as subjects};
 
 impl UpdateContext<'_> {
     /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines.
@@ -55,29 +53,22 @@ impl UpdateContext<'_> {
                 self.set_stop(Stop { noise_levels, rmse_linear: None, ..self.model.stop });
             }
             Some(Overlay::Pick(pick)) => {
+                let text = pick.editor.text().to_string();
+                if pick.takes_commands && self.typed_command(&text) {
+                    return;
+                }
+                let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
                 let Some(found) = pick.found.get(pick.at.index) else { return };
                 let (name, take) = (pick.entries[*found].name.clone(), pick.take);
                 self.model.overlay = None;
                 take(self, &name);
             }
-            Some(Overlay::Form(form)) => {
-                if form.fields.editor.is_none() {
-                    self.confirm_form();
-                } else if self.apply_field() {
-                    self.move_field_cursor(1);
-                }
-            }
+            Some(Overlay::Form(_)) => self.open_row(),
             Some(Overlay::Prompt(_)) => self.answer_prompt(),
             Some(Overlay::Question(question)) => self.answer(question.at.index),
             Some(Overlay::ViewerImage(_)) => {}
             None if self.model.watch.is_some() => {}
-            None if self.model.focus == Focus::Inspector => {
-                if self.model.inspector.editor.is_some() {
-                    self.apply_field();
-                } else {
-                    self.open_field(self.typed);
-                }
-            }
+            None if self.model.focus == Focus::Inspector => self.open_row(),
             None => self.set_focus(Focus::Inspector),
         }
     }
@@ -97,21 +88,6 @@ impl UpdateContext<'_> {
         }
     }
 
-    pub(super) fn pick_command(&mut self) {
-        let entry = |command: &Command| PickEntry {
-            name: command.label.to_string(),
-            note: command.chapter.to_string(),
-            keys: command.formatted_keys(self.model.watch.is_some(), str::to_string),
-        };
-        let listed = COMMANDS.iter().filter(|command| command.is_listed(self.model));
-        let entries: Vec<_> = listed.map(entry).collect();
-        self.open_pick("actions and keys", entries, 0, |c, label| {
-            if let Some(command) = COMMANDS.iter().find(|command| command.label == label) {
-                c.run(command);
-            }
-        });
-    }
-
     /// Opens a list with the cursor on the entry with index `index`. The name of the picked entry is
     /// passed to `take`.
     pub(super) fn open_pick(
@@ -125,28 +101,73 @@ impl UpdateContext<'_> {
         let (title, editor) = (title.into(), Editor::default());
         let found = (0..entries.len()).collect();
         let at = ListCursor { index, scroll: 0 };
-        self.model.overlay = Some(Overlay::Pick(Pick { title, entries, editor, found, at, take }));
+        self.model.overlay = Some(Overlay::Pick(Pick {
+            title,
+            entries,
+            editor,
+            found,
+            at,
+            takes_commands: false,
+            take,
+        }));
+    }
+
+    /// Completes the text that is being typed, or goes to the next group of fields; `by` is 1 or, to
+    /// the previous one, -1.
+    pub(super) fn complete(&mut self, by: isize) {
+        match &mut self.model.overlay {
+            Some(Overlay::Pick(pick)) if by > 0 => {
+                if let Some(found) = pick.found.get(pick.at.index) {
+                    let name = &pick.entries[*found].name;
+                    let field = name.split_once(" of ").map(|(field, _)| field.replace(' ', "_"));
+                    let sets = pick.takes_commands && pick.editor.text().starts_with("set ");
+                    let text = field.filter(|_| sets).map(|field| format!("set {field} "));
+                    pick.editor = Editor::new(text.unwrap_or_else(|| name.clone()));
+                    self.search();
+                }
+            }
+            None | Some(Overlay::Form(_)) => self.next_group(by),
+            Some(_) => self.move_cursor(by),
+        }
+    }
+
+    /// Filters the properties in the inspector, or elsewhere lists the parts of the scene.
+    pub(super) fn find(&mut self) {
+        if self.model.context() == KeyContext::Inspector {
+            return self.open_filter("");
+        }
+        let parts = subjects(self.scene()).into_iter();
+        let entry = |(section, subject): (Section, Target)| {
+            PickEntry::new(subject.title(self.scene()), section.title())
+        };
+        let parts: Vec<_> = parts.map(entry).collect();
+        self.open_pick("find a part of the scene", parts, 0, |c, title| c.select_titled(title));
+    }
+
+    fn select_titled(&mut self, title: &str) {
+        let mut subjects = subjects(self.scene()).into_iter().map(|(_, subject)| subject);
+        if let Some(found) = subjects.find(|subject| subject.title(self.scene()) == title) {
+            self.select(found);
+        }
     }
 
     /// Updates the open list to the entries that match the search text, best match first.
     pub(super) fn search(&mut self) {
+        if self.model.field_list().filter.is_some() {
+            self.model.field_list_mut().cursor = 0;
+        }
         let Some(Overlay::Pick(pick)) = &mut self.model.overlay else { return };
         let text = pick.editor.text();
-        let pattern = Pattern::parse(text, CaseMatching::Ignore, Normalization::Smart);
-        let mut matcher = Matcher::new(Config::DEFAULT);
-        let mut buffer = Vec::new();
-        let mut score_of =
-            |line: &str| pattern.score(Utf32Str::new(line, &mut buffer), &mut matcher);
-        let scored = pick.entries.iter().enumerate();
-        let scored = scored.filter_map(|(i, entry)| {
-            let line = format!("{} {}", entry.name, entry.note);
-            // A match in the name comes before a match in the note alone.
-            let is_in_note = score_of(&entry.name).is_none();
-            Some((is_in_note, Reverse(score_of(&line)?), i))
-        });
-        let mut scored: Vec<_> = scored.collect();
-        scored.sort_unstable();
-        pick.found = scored.into_iter().map(|(_, _, i)| i).collect();
+        // The field is searched while its value is typed.
+        let wanted = match text.strip_prefix("set ").filter(|_| pick.takes_commands) {
+            Some(field) => field.split(' ').next().unwrap_or_default(),
+            None => text,
+        };
+        let ranked = pick.entries.iter().enumerate();
+        let mut ranked: Vec<_> =
+            ranked.filter_map(|(i, entry)| Some((rank(wanted, entry)?, i))).collect();
+        ranked.sort_unstable();
+        pick.found = ranked.into_iter().map(|(_, i)| i).collect();
         pick.at = ListCursor::default();
     }
 

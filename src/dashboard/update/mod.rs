@@ -13,6 +13,7 @@ mod keys;
 mod lists;
 mod mouse;
 mod objects;
+mod palette;
 mod prompt;
 mod recovery;
 mod render;
@@ -242,9 +243,11 @@ impl UpdateContext<'_> {
     }
 
     fn select(&mut self, subject: Target) {
+        self.model.chosen_by_deletion = false;
         if self.model.selection != subject {
             self.model.selection = subject;
             self.model.inspector = FieldList::default();
+            self.skip_text();
         }
     }
 
@@ -284,6 +287,8 @@ impl UpdateContext<'_> {
             };
             self.select(near.unwrap_or(Target::Camera));
         }
+        let scene = Arc::clone(self.model.scene());
+        self.model.marked.retain(|part| part.exists(&scene));
         self.request_view();
         self.normalize_lists();
         self.autosave();

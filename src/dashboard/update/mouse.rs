@@ -7,7 +7,7 @@ use crate::dashboard::{
 use glam::DVec3;
 use ratatui::layout::Rect;
 use zerkalo_scene::Scene;
-use zerkalo_scene::edit::{SceneSettings, Target};
+use zerkalo_scene::edit::{SceneSettings, Target, Widget};
 use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
 /// Number of lines that a list scrolls per tick of the wheel.
@@ -62,7 +62,8 @@ impl UpdateContext<'_> {
             // Watched films have no camera to orbit and no objects to select.
             let is_inert = self.model.watch.is_some() && self.model.mode != Mode::Probe;
             let (last, in_picture) = ([column, row], is_in(mouse, layout.image) && !is_inert);
-            self.model.drag = Some(Drag { button, modified, last, moved: false, in_picture });
+            self.model.drag =
+                Some(Drag { button, modified, last, moved: false, in_picture, on_number: false });
         } else if let Some((rows, _)) = self.model.inspector_rows()
             && is_in(mouse, layout.inspector)
         {
@@ -90,6 +91,14 @@ impl UpdateContext<'_> {
             self.model.focus == Focus::Outline && subject.as_ref() == Some(&self.model.selection);
         self.set_focus(Focus::Outline);
         match subject {
+            Some(subject) if mouse.modified => {
+                // The selection joins the marked parts.
+                if self.model.marked.is_empty() && subject != self.model.selection {
+                    self.toggle_mark();
+                }
+                self.select(subject);
+                self.toggle_mark();
+            }
             Some(_) if again => self.set_focus(Focus::Inspector),
             Some(subject) => self.select(subject),
             None => {}
@@ -103,9 +112,19 @@ impl UpdateContext<'_> {
         let (cursor, line) = (*cursor, line_at(rows, *scroll, mouse));
         let opens = focused && editor.is_none();
         let lines = self.model.field_lines();
+        let pressed = line.and_then(|line| lines.get(line)?.entry());
+        let on_number = pressed
+            .is_some_and(|field| matches!(field.property.widget, Widget::Numbers | Widget::Color));
+        let Mouse { column, row, modified, .. } = mouse;
+        let (last, button) = ([column, row], Button::Left);
+        let drag = Drag { button, modified, last, moved: false, in_picture: false, on_number };
+        self.model.drag = Some(drag).filter(|drag| drag.on_number);
         match line.filter(|line| lines.get(*line).and_then(PanelLine::entry).is_some()) {
-            Some(line) if opens && line == cursor => self.open_field(None),
-            Some(line) if self.apply_field() => self.model.field_list_mut().cursor = line,
+            Some(line) if opens && line == cursor => self.open_row(),
+            Some(line) if self.apply_field() => {
+                self.model.field_list_mut().cursor = line;
+                self.end_filter();
+            }
             _ => {}
         }
     }
@@ -143,6 +162,11 @@ impl UpdateContext<'_> {
         drag.last = [mouse.column, mouse.row];
         drag.moved = true;
         let drag = *drag;
+        if drag.on_number {
+            // Each column is a fine step. Ten of them would be a coarse one.
+            self.model.field_list_mut().editor = None;
+            return self.step_field(0.1 * right.clamp(-9.0, 9.0));
+        }
         if !drag.in_picture || self.model.overlay.is_some() {
             return;
         }
@@ -214,6 +238,12 @@ impl UpdateContext<'_> {
         let ticks = ticks.clamp(-100, 100);
         let lines = -(ticks * WHEEL_LINES) as isize;
         if self.model.overlay.is_some() {
+            let rows = self.model.list_rows().unwrap_or_default();
+            let FieldList { cursor, scroll, editor, .. } = self.model.field_list();
+            let chosen = line_at(rows, *scroll, mouse) == Some(*cursor) && editor.is_none();
+            if chosen && self.in_form() {
+                return self.step_field(f64::from(ticks));
+            }
             self.move_cursor(-ticks as isize);
             return;
         }

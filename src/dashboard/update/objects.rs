@@ -1,9 +1,12 @@
 //! Commands on the selected part of the scene.
 
-use crate::dashboard::UpdateContext;
 use crate::dashboard::update::{Coalesce, Direction};
+use crate::dashboard::{Mode, UpdateContext};
 use glam::{DVec2, DVec3};
-use zerkalo_scene::edit::{self, Edit, EditError, bounds, step_length};
+use std::collections::BTreeSet;
+use zerkalo_scene::Scene;
+use zerkalo_scene::edit::{self, Edit, EditError, Target, bounds, step_length};
+use zerkalo_scene::value::rotated_y;
 
 /// Largest factor by which a drag in the ground plane is stretched in depth. The stretch
 /// compensates foreshortening: it is 1 / sin of the angle between view direction and ground, which
@@ -31,8 +34,52 @@ impl UpdateContext<'_> {
         self.move_by(x * right + y * DVec3::Y + z * away);
     }
 
-    fn move_by(&mut self, by: DVec3) {
-        let edit = edit::move_by(self.scene(), &self.model.selection, by.to_array());
+    /// Returns the edits of all marked parts, or of the selection, as one; `what` names it.
+    fn edit_marked(
+        &self,
+        what: &str,
+        edit: impl Fn(&Scene, &Target) -> Result<Edit, EditError>,
+    ) -> Result<Edit, EditError> {
+        let targets = self.model.targets();
+        let mut edited = edit(self.scene(), &targets[targets.len() - 1])?;
+        // A deletion changes the indices of the parts that follow, which come first.
+        for target in targets.iter().rev().skip(1) {
+            edited = edit(&edited.scene, target)?;
+        }
+        if let [_, _, ..] = targets[..] {
+            edited.label = format!("{what} {} parts", targets.len());
+        }
+        Ok(edited)
+    }
+
+    /// Returns the name of the selection, or the names of the marked parts.
+    fn marked_label(&self) -> String {
+        let targets = self.model.targets();
+        let shown: Vec<_> = targets.iter().take(3).map(|t| t.label(self.scene())).collect();
+        match targets.len() {
+            0..=3 => shown.join(", "),
+            n => format!("{} and {} more", shown.join(", "), n - 3),
+        }
+    }
+
+    /// Marks the selection, or removes its mark.
+    pub(super) fn toggle_mark(&mut self) {
+        let subject = self.model.selection.clone();
+        if !matches!(subject, Target::Object(_) | Target::Light(_)) {
+            return self.refuse("Only objects and lights are marked");
+        }
+        if !self.model.marked.remove(&subject) {
+            self.model.marked.insert(subject);
+        }
+        let text = match self.model.marked.is_empty() {
+            true => "nothing is marked".to_string(),
+            false => format!("marked: {} · m r D x act on all · Esc unmarks", self.marked_label()),
+        };
+        self.say(text);
+    }
+
+    pub(super) fn move_by(&mut self, by: DVec3) {
+        let edit = self.edit_marked("move", |s, target| edit::move_by(s, target, by.to_array()));
         self.commit(edit, self.gesture());
     }
 
@@ -71,7 +118,20 @@ impl UpdateContext<'_> {
     /// Rotates the selection counter-clockwise as seen from above: the side that faces the viewer
     /// moves to the right.
     pub(super) fn rotate_selection(&mut self, degrees: f64) {
-        let edit = edit::rotate(self.scene(), &self.model.selection, degrees);
+        let centers = self.model.targets().into_iter();
+        let centers: Vec<_> =
+            centers.filter_map(|t| bounds(self.scene(), &t).map(|ball| ball.center)).collect();
+        let pivot = centers.iter().sum::<DVec3>() / centers.len().max(1) as f64;
+        let is_group = self.model.marked.len() > 1;
+        let edit = self.edit_marked("rotate", |scene, target| {
+            let rotated = edit::rotate(scene, target, degrees)?;
+            // Several parts rotate about their common centre.
+            let Some(ball) = bounds(scene, target).filter(|_| is_group) else { return Ok(rotated) };
+            let from = (ball.center - pivot).to_array();
+            let to = pivot + DVec3::from_array(rotated_y(from, degrees));
+            let now = bounds(&rotated.scene, target).map_or(to, |ball| ball.center);
+            edit::move_by(&rotated.scene, target, (to - now).to_array())
+        });
         self.commit(edit, self.gesture());
     }
 
@@ -80,20 +140,40 @@ impl UpdateContext<'_> {
         self.commit(edit, Coalesce::Single);
     }
 
+    /// Duplicates the selection or the marked parts, which are then ready to be moved.
     pub(super) fn duplicate(&mut self) {
-        let edit = edit::duplicate(self.scene(), &self.model.selection);
+        let copies = std::cell::RefCell::new(BTreeSet::new());
+        let edit = self.edit_marked("duplicate", |scene, target| {
+            let edit = edit::duplicate(scene, target)?;
+            copies.borrow_mut().insert(edit.target.clone());
+            Ok(edit)
+        });
         if self.commit_and_select(edit) {
-            let label = self.model.selection.label(self.scene());
-            self.say(format!("{label} added · m moves it"));
+            let copies = copies.into_inner();
+            self.model.marked = if copies.len() > 1 { copies } else { BTreeSet::new() };
+            let label = self.marked_label();
+            if matches!(self.model.selection, Target::Object(_) | Target::Light(_)) {
+                self.enter_mode(Mode::Move);
+            }
+            self.say(format!("{label} added"));
         }
     }
 
+    /// Deletes the selection or the marked parts. The part that is selected afterwards is not
+    /// deleted before the user has selected it.
     pub(super) fn delete(&mut self) {
-        let label = self.model.selection.label(self.scene());
-        let edit = edit::delete(self.scene(), &self.model.selection);
+        let label = self.marked_label();
+        if std::mem::take(&mut self.model.chosen_by_deletion) {
+            return self.say(format!("{label} is selected now · x again deletes it"));
+        }
+        let edit = self.edit_marked("delete", edit::delete);
         let noted = edit.as_ref().is_ok_and(|edit| edit.note.is_some());
-        if self.commit_and_select(edit) && !noted {
-            self.say(format!("{label} deleted · u undoes"));
+        if self.commit_and_select(edit) {
+            self.model.marked.clear();
+            self.model.chosen_by_deletion = true;
+            if !noted {
+                self.say(format!("{label} deleted · u undoes"));
+            }
         }
     }
 

@@ -19,7 +19,7 @@ impl UpdateContext<'_> {
         apply: fn(&mut UpdateContext<'_>, &str) -> Result<(), String>,
     ) {
         let (title, help) = (title.to_string(), help.to_string());
-        let editor = Editor::new(text);
+        let editor = Editor::replacing(text);
         self.model.overlay = Some(Overlay::Prompt(Prompt { title, help, editor, apply }));
     }
 
@@ -48,6 +48,43 @@ impl UpdateContext<'_> {
             }
             None => self.refuse(&format!("{label} has no name to change")),
         }
+    }
+
+    /// Asks for a distance, which the typed axis or digit begins.
+    pub(super) fn ask_move(&mut self) {
+        let text = match self.typed {
+            Some(c @ 'x'..='z') => format!("{c} "),
+            typed => typed.map(String::from).unwrap_or_default(),
+        };
+        let help = "An axis and a distance in scene units, such as x .5, or all three: .5 0 -1.";
+        self.prompt("move by", help, "", |c, text| c.move_typed(text));
+        self.continue_prompt(text);
+    }
+
+    pub(super) fn ask_angle(&mut self) {
+        let text = self.typed.map(String::from).unwrap_or_default();
+        let help = "Degrees about the vertical axis, counter-clockwise seen from above.";
+        self.prompt("rotate by", help, "", |c, text| {
+            let degrees = text.parse().map_err(|_| "Type an angle, such as 30.".to_string())?;
+            c.rotate_selection(degrees);
+            c.end_mode();
+            Ok(())
+        });
+        self.continue_prompt(text);
+    }
+
+    /// Puts `text` into the prompt, so that typing goes on after it.
+    fn continue_prompt(&mut self, text: String) {
+        if let Some(Overlay::Prompt(prompt)) = &mut self.model.overlay {
+            prompt.editor = Editor::new(text);
+        }
+    }
+
+    fn move_typed(&mut self, text: &str) -> Result<(), String> {
+        let by = distances(text).ok_or("Type an axis and a distance, such as x .5.")?;
+        self.move_by(by.into());
+        self.end_mode();
+        Ok(())
     }
 
     pub(super) fn ask_view_name(&mut self) {
@@ -90,7 +127,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    fn save_to(&mut self, text: &str) -> Result<(), String> {
+    pub(super) fn save_to(&mut self, text: &str) -> Result<(), String> {
         if text.is_empty() || text.ends_with('/') {
             return Err("A file needs a name.".to_string());
         }
@@ -145,6 +182,29 @@ impl UpdateContext<'_> {
     }
 }
 
+/// Parses axes with distances, such as `x .5 z -1`, or three distances.
+fn distances(text: &str) -> Option<[f64; 3]> {
+    let apart = |c: char| match c {
+        'x' | 'y' | 'z' => format!(" {c} "),
+        ',' => " ".to_string(),
+        c => c.to_string(),
+    };
+    let spaced: String = text.chars().map(apart).collect();
+    let mut by = [0.0; 3];
+    let words: Vec<_> = spaced.split_whitespace().collect();
+    let finite = |word: &str| word.parse().ok().filter(|x: &f64| x.is_finite());
+    if let [x, y, z] = words[..]
+        && finite(x).is_some()
+    {
+        return Some([finite(x)?, finite(y)?, finite(z)?]);
+    }
+    for pair in words.chunks(2) {
+        let [axis, distance] = pair else { return None };
+        by["xyz".find(axis)?] += finite(distance)?;
+    }
+    (!words.is_empty()).then_some(by)
+}
+
 /// Formats stop criteria, such as `noise 0.5 time 60`, or `none`.
 pub(super) fn stop_text(stop: &Stop) -> String {
     let targets = [
@@ -197,6 +257,16 @@ fn parse_stop(text: &str) -> Result<Stop, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn distances_have_axes() {
+        assert_eq!(distances("x .5"), Some([0.5, 0.0, 0.0]));
+        assert_eq!(distances("y-1 x2"), Some([2.0, -1.0, 0.0]));
+        assert_eq!(distances(".5, 0 -1"), Some([0.5, 0.0, -1.0]));
+        for text in ["", "x", "1", "1 2", "a 1", "x inf", "x 1 2"] {
+            assert_eq!(distances(text), None, "{text}");
+        }
+    }
 
     #[test]
     fn stop_criteria_round_trip_through_text() {

@@ -1,14 +1,15 @@
 //! Drawing of properties and their values.
 
+use crate::dashboard::panel_lines::RowAct;
 use crate::dashboard::text::{columns, skip};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
-use crate::dashboard::{Editor, FieldLine, FieldList, Focus, Layout, Model, PanelLine};
+use crate::dashboard::{BORDER, Editor, FieldLine, FieldList, Focus, Layout, Model, PanelLine};
 use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
 use zerkalo_render::film::Display;
-use zerkalo_scene::edit::{Property, Widget};
+use zerkalo_scene::edit::Widget;
 use zerkalo_scene::value::{number, round_significant};
 
 /// Unit of nearly all numbers, therefore shown only for the property under the cursor.
@@ -32,8 +33,12 @@ pub fn draw(
     painter: &mut Painter,
 ) -> Option<Position> {
     let (lines, state) = (model.field_lines(), model.field_list());
-    let label =
-        |line: &PanelLine| line.entry().map_or(0, |f| 1 + 2 * f.property.depth + columns(&f.label));
+    let label = |line: &PanelLine| match line.entry() {
+        Some(field) if field.act == RowAct::Edit => {
+            1 + 2 * field.property.depth + columns(&field.label)
+        }
+        _ => 0,
+    };
     let widest = lines.iter().map(label).max().unwrap_or(0);
     let labels = widest.min(usize::from(list.width) * 9 / 20);
     let mut typing = None;
@@ -50,7 +55,13 @@ pub fn draw(
     }
     let field = lines.get(state.cursor).and_then(PanelLine::entry);
     if let Some(field) = field.filter(|_| active) {
-        explain(&field.property, state.problem(), help, painter);
+        explain(field, state.problem(), help, painter);
+    }
+    if let Some(filter) = &state.filter {
+        let inside = Rect { height: list.height + help.height, ..list };
+        let mut to = painter.edge(inside.outer(BORDER), inside.height + 1);
+        to.put(" / ", to.theme.accent());
+        typing = typed(filter, &mut to);
     }
     typing
 }
@@ -72,15 +83,38 @@ fn draw_field(
     if chosen.is_some() {
         to.fill(name);
     }
+    if field.act != RowAct::Edit {
+        let style = if chosen.is_some() { name } else { theme.accent() };
+        let hint = if field.act == RowAct::Add { "Enter " } else { "" };
+        to.put_right(hint, columns(&field.label) + 2, style);
+        to.put(" ", style).put(&field.label, style.add_modifier(Modifier::BOLD));
+        return None;
+    }
     let indent = 1 + 2 * field.property.depth;
     to.skip(indent.min(labels));
-    to.put_wide(&field.label, labels.saturating_sub(indent), name).skip(2);
+    // The number's name within a list is never cut.
+    let room = labels.saturating_sub(indent);
+    let (list, number) = match field.component.and(field.label.rfind('.')) {
+        Some(at) if columns(&field.label) > room => field.label.split_at(at),
+        _ => (field.label.as_str(), ""),
+    };
+    let number_room = columns(number).min(room);
+    to.put_wide(list, room - number_room, name).put_wide(number, number_room, name).skip(2);
     if let Some(editor) = chosen.and_then(|state| state.editor.as_ref()) {
         return typed(editor, &mut to);
     }
     let swatch = field.swatch.and_then(|color| theme.swatch(Display::default().to_8()(color)));
     if let Some(style) = swatch {
         to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
+    }
+    let needed = columns(&brief(&field.value)) + columns(field.property.unit) + BAR + 4;
+    if let Some([full, rest]) = bar(field).filter(|_| to.left() >= needed) {
+        let color = match (field.property.widget, field.component) {
+            (Widget::Color, Some(i)) => theme.swatch(CHANNELS[i.min(2)]),
+            _ => None,
+        };
+        let color = if chosen.is_some() { name } else { color.unwrap_or(theme.accent()) };
+        to.put_right(" ", 0, name).put_right(&rest, 0, name).put_right(&full, 0, color);
     }
     let words = matches!(field.property.widget, Widget::Choice | Widget::Kind | Widget::Switch);
     match field.value.as_str() {
@@ -96,28 +130,30 @@ fn draw_field(
     None
 }
 
-/// Draws help on a property: the reason why a value was refused, or what is valid.
-fn explain(property: &Property, problem: Option<&str>, area: Rect, painter: &mut Painter) {
-    let theme = painter.theme;
-    let mut texts = match problem {
-        Some(problem) => vec![(problem.to_string(), theme.bad())],
-        None => vec![
-            (property.doc.to_string(), theme.dim()),
-            (expected(property), theme.dim().add_modifier(Modifier::ITALIC)),
-        ],
-    };
-    texts.retain(|(text, _)| !text.is_empty());
-    painter.paragraphs(area.inner(Margin::new(1, 0)), &texts);
+/// Columns of the bar that shows where a number is in its range.
+const BAR: usize = 6;
+/// Colours of the bars of red, green and blue.
+const CHANNELS: [[u8; 3]; 3] = [[232, 98, 98], [110, 178, 98], [98, 140, 242]];
+
+/// Returns the filled and the empty part of the bar that shows where the number of `field` is in its
+/// usual range; `None` without one.
+fn bar(field: &FieldLine) -> Option<[String; 2]> {
+    let [low, high] = field.property.range?;
+    let value: f64 = field.value.parse().ok()?;
+    let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    let full = (share * BAR as f64).round() as usize;
+    Some(["━".repeat(full), "─".repeat(BAR - full)])
 }
 
-/// Describes valid values, with the default if the present value is another.
-fn expected(property: &Property) -> String {
-    match &property.default {
-        Some(default) if !default.is_empty() && !property.is_default => {
-            format!("{}; default {default}", property.expected)
-        }
-        _ => property.expected.clone(),
-    }
+/// Draws help on a field: the reason why a value was refused, or what is valid.
+fn explain(field: &FieldLine, problem: Option<&str>, area: Rect, painter: &mut Painter) {
+    let theme = painter.theme;
+    let styles = match problem {
+        Some(_) => [theme.bad(); 2],
+        None => [theme.dim(), theme.dim().add_modifier(Modifier::ITALIC)],
+    };
+    let texts: Vec<_> = field.help(problem).into_iter().zip(styles).collect();
+    painter.paragraphs(area.inner(Margin::new(1, 0)), &texts);
 }
 
 /// Draws a heading, and a horizontal line from there to the column before the last.
@@ -138,6 +174,7 @@ pub fn typed(editor: &Editor, to: &mut Row) -> Option<Position> {
     let hidden = editor.input.visual_scroll(width);
     let style = Style::new().add_modifier(Modifier::UNDERLINED).patch(match editor.problem {
         Some(_) => to.theme.bad(),
+        None if editor.untouched => to.theme.accent().add_modifier(Modifier::REVERSED),
         None => to.theme.accent(),
     });
     let (x, y) = (to.x, to.y);

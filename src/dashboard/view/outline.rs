@@ -33,7 +33,10 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
                 };
                 match id {
                     Some(style) => to.put(" ", name).put("■", style).put(" ", name),
-                    None => to.put(if selected.is_some() { " ▸ " } else { "   " }, name),
+                    None => {
+                        let mark = if model.marked.contains(subject) { "●" } else { " " };
+                        to.put(if selected.is_some() { " ▸" } else { "  " }, name).put(mark, name)
+                    }
                 };
                 // The name has precedence over the note.
                 to.put_right(" ", 0, name).put_right(note, 2 + columns(label), noted);

@@ -1,6 +1,5 @@
 //! Status line and hint line, the last two rows of the screen.
 
-use crate::dashboard::Model;
 use crate::dashboard::hints::hints;
 use crate::dashboard::model::Tone;
 use crate::dashboard::text::{columns, duration, durations, number};
@@ -8,6 +7,7 @@ use crate::dashboard::update::commands::Hint;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::theme::Theme;
 use crate::dashboard::view::watch;
+use crate::dashboard::{Mode, Model};
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 use zerkalo_render::schedule::StoppedBy;
@@ -171,6 +171,19 @@ pub fn hints_line(model: &Model, area: Rect, painter: &mut Painter) {
     let theme = painter.theme;
     let mut row = painter.row(area, 0);
     row.skip(1);
+    let widest = row.left();
+    let room = match &model.notice {
+        None => widest,
+        // A notice never covers the hints of a mode.
+        Some(notice) if model.is_busy() || model.mode != Mode::Orbit => {
+            widest.saturating_sub(columns(&notice.text) + 5).max(widest / 2)
+        }
+        Some(_) => 0,
+    };
+    for hint in fitting(hints(model), room) {
+        row.put(hint.keys, theme.accent().add_modifier(Modifier::BOLD)).put(" ", theme.dim());
+        row.put(hint.text, theme.dim()).skip(3);
+    }
     if let Some(notice) = &model.notice {
         let (mark, style) = match notice.tone {
             Tone::Good => ("✓ ", theme.good()),
@@ -178,18 +191,12 @@ pub fn hints_line(model: &Model, area: Rect, painter: &mut Painter) {
             Tone::Bad => ("✗ ", theme.bad()),
         };
         row.put(mark, style).put(&notice.text, theme.text());
-        return;
-    }
-    if let Some(Snapshot { report: Report { state: State::Finished(_), .. }, .. }) =
+    } else if let Some(Snapshot { report: Report { state: State::Finished(_), .. }, .. }) =
         model.snapshot.as_deref()
         && model.overlay.is_none()
         && row.left() > 100
     {
         row.put_right(&model.graphics.description(), 40, theme.dim());
-    }
-    for hint in fitting(hints(model), row.left()) {
-        row.put(hint.keys, theme.accent().add_modifier(Modifier::BOLD)).put(" ", theme.dim());
-        row.put(hint.text, theme.dim()).skip(3);
     }
 }
 

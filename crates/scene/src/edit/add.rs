@@ -101,7 +101,7 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     };
     let factor = size / (high - low).max_element();
     let foot = DVec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z));
-    let by = base - factor * foot;
+    let by = (base - factor * foot).map(|x| crate::value::round_fine(x, size));
     steps.extend([TransformOp::Scale(Scale([factor; 3])), TransformOp::Translate(by.to_array())]);
     steps
 }

@@ -118,7 +118,7 @@ fn start(field: &Field, scene: &Scene, target: &Target) -> Option<KeyValue> {
     }
 }
 
-/// Number of arrow steps, negative for steps down. Fine steps are about a tenth of coarse steps.
+/// Number of arrow steps, negative for steps down. Fine steps are a tenth of the unit, or a fifth of the way between rungs.
 #[derive(Clone, Copy)]
 struct StepCount {
     steps: i64,
@@ -225,17 +225,15 @@ fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> 
     within(moved, range, x)
 }
 
-/// Rungs of coarse steps: their mantissas, in thousandths. Successive ones differ by about a tenth.
-const RUNGS: [i64; 23] = [
-    1000, 1100, 1200, 1300, 1400, 1600, 1800, 2000, 2200, 2500, 2800, 3000, 3300, 3600, 4000, 4500,
-    5000, 5500, 6000, 6500, 7000, 8000, 9000,
-];
+/// Rungs of coarse steps: their mantissas, in hundredths. Successive ones differ by about a quarter.
+const RUNGS: [i64; 10] = [100, 125, 160, 200, 250, 320, 400, 500, 640, 800];
 
-/// Returns the mantissas of fine steps: 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ... 9.95.
-fn fine_rungs() -> Vec<i64> {
-    let parts = [(1000..2000).step_by(10), (2000..5000).step_by(20), (5000..10_000).step_by(50)];
-    parts.into_iter().flatten().collect()
-}
+/// Rungs of fine steps, which differ by about a twentieth and include the coarse ones.
+const FINE_RUNGS: [i64; 42] = [
+    100, 105, 110, 115, 120, 125, 130, 140, 150, 160, 170, 180, 190, 200, 210, 220, 230, 240, 250,
+    260, 280, 300, 320, 340, 360, 380, 400, 420, 450, 480, 500, 530, 560, 600, 640, 680, 720, 760,
+    800, 850, 900, 950,
+];
 
 /// Returns the number that is `steps` rungs above `x`, which is at least 0. The result is 0, a rung
 /// of at least `floor`, or an end of `range`, so that steps up and down undo each other.
@@ -257,14 +255,15 @@ fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: 
 /// Returns the next rung above or below `x`, which is greater than 0.
 fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     let e = floor_log10(x);
-    let mantissa = x * format!("1e{}", 3 - e).parse().unwrap_or(1.0);
-    let (rungs, below) = if fine { (fine_rungs(), 995) } else { (RUNGS.to_vec(), 900) };
+    let mantissa = x * format!("1e{}", 2 - e).parse().unwrap_or(1.0);
+    let rungs: &[i64] = if fine { &FINE_RUNGS } else { &RUNGS };
+    let below = rungs.last().map_or(0, |last| last / 10);
     // Rounding errors may move a number slightly off its rung.
     let next = match up {
-        true => rungs.into_iter().find(|r| *r as f64 > mantissa + 1e-5).unwrap_or(10_000),
-        false => rungs.into_iter().rfind(|r| (*r as f64) < mantissa - 1e-5).unwrap_or(below),
+        true => rungs.iter().copied().find(|r| *r as f64 > mantissa + 1e-6).unwrap_or(1000),
+        false => rungs.iter().copied().rfind(|r| (*r as f64) < mantissa - 1e-6).unwrap_or(below),
     };
-    format!("{next}e{}", e - 3).parse().unwrap_or(x)
+    format!("{next}e{}", e - 2).parse().unwrap_or(x)
 }
 
 /// Returns a colour with its brightness changed by `count` steps. Upwards, black becomes dark grey.

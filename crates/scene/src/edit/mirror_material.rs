@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(mirror(&scene, Some(&Target::Object(0))).as_deref(), Some("glossy"));
         let outline = crate::edit::outline(&scene);
         let (section, _) = outline.iter().find(|(_, s)| *s == Target::Object(0)).unwrap();
-        assert_eq!(*section, crate::edit::Section::Mirrors);
+        assert_eq!(*section, crate::edit::Section::Objects);
     }
 
     #[test]
@@ -118,7 +118,7 @@ mod tests {
             seen.push(scene.materials["mirror"].roughness);
         }
         assert!(seen.is_sorted_by(|a, b| a < b), "{seen:?}");
-        assert!(seen.contains(&0.3) && seen.contains(&0.001) && seen.contains(&0.05), "{seen:?}");
+        assert!(seen.contains(&0.32) && seen.contains(&0.001) && seen.contains(&0.05), "{seen:?}");
         for expected in seen.iter().rev().skip(1) {
             scene = step_mirror(&scene, None, "roughness", -1.0).unwrap().scene;
             assert_eq!(scene.materials["mirror"].roughness, *expected);

@@ -44,7 +44,7 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<KeyValue, EditError> {
             Some(list) if [1, 3].contains(&list.len()) => Ok(KeyValue::Numbers(list)),
             _ => Err(wrong()),
         },
-        ValueType::Color(_) => match Color::from_hex(unquoted(text)) {
+        ValueType::Color(_) => match Color::typed(unquoted(text)) {
             Some(color) => Ok(KeyValue::Numbers(color.0.to_vec())),
             None if text.contains('#') => Err(wrong()),
             None => list(3).map(KeyValue::Numbers),
@@ -194,7 +194,7 @@ mod tests {
         let color = field(ValueType::Color(NumberRange::SHARE));
         assert_eq!(parse(&color, "#ff0000"), Ok(KeyValue::Numbers(vec![1.0, 0.0, 0.0])));
         assert_eq!(parse(&color, ".5 0 1"), Ok(KeyValue::Numbers(vec![0.5, 0.0, 1.0])));
-        assert!(parse(&color, "#ff00").is_err() && parse(&color, "red").is_err());
+        assert!(parse(&color, "#ff00").is_err() && parse(&color, "redd").is_err());
         let switch = field(ValueType::Switch);
         for (text, expected) in
             [("true", true), ("ON", true), ("y", true), ("of", false), ("n", false), ("f", false)]

@@ -54,6 +54,8 @@ pub struct Property {
     pub color: Option<[f64; 3]>,
     /// Unit of the numbers in the value; may be empty.
     pub unit: &'static str,
+    /// Ends of the range of usual numbers; `None` if there is none.
+    pub range: Option<[f64; 2]>,
     /// Accepted values, as a phrase: `a number from 0 to 1`.
     pub expected: String,
     /// Accepted words of a choice, a kind or a list; empty for other properties.
@@ -224,6 +226,7 @@ impl PropertyWalker<'_> {
             widget,
             words,
             unit: field.unit,
+            range: usual_range(field.takes),
             expected: expected(field.takes),
             doc: field.doc,
             default: match field.preset {
@@ -254,6 +257,17 @@ pub(super) fn words(kinds: &[Field]) -> Vec<Word> {
     kinds.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
 }
 
+/// Returns the ends of the range of usual numbers.
+fn usual_range(takes: ValueType) -> Option<[f64; 2]> {
+    let range = takes.range();
+    let is_share = [NumberRange::SHARE, NumberRange::COEFFICIENT].contains(&range);
+    match range.high <= 360.0 {
+        _ if is_share || matches!(takes, ValueType::Color(_)) => Some([0.0, 1.0]),
+        true => Some([range.low, range.high]),
+        false => None,
+    }
+}
+
 /// Returns a phrase for the accepted values in the notation that users type.
 fn expected(takes: ValueType) -> String {
     match takes {
@@ -263,7 +277,10 @@ fn expected(takes: ValueType) -> String {
         ValueType::Direction => "3 numbers, not all zero".to_string(),
         ValueType::Factor => "a number other than 0, or 3 of them".to_string(),
         ValueType::Color(NumberRange { high, .. }) => {
-            format!("red, green, blue (linear, 0 to {}) or #rrggbb", number(high))
+            format!(
+                "red, green, blue (linear, 0 to {}), #rrggbb, a name, hsv 30 1 1, 2700 K",
+                number(high)
+            )
         }
         ValueType::OneOf(kinds) | ValueType::ListOf(kinds) => format!("one of {}", names(kinds)),
         ValueType::Choice(choices) => {

@@ -5,7 +5,6 @@
 use crate::edit::part::part;
 use crate::value::truncated;
 use crate::{Object, Scene};
-use std::slice;
 
 /// Target of an edit: a part of the scene that can be selected and edited.
 #[allow(missing_docs, reason = "the names say it")]
@@ -42,8 +41,6 @@ pub enum Section {
     Camera,
     Surroundings,
     Lights,
-    /// Objects with a material that reflects.
-    Mirrors,
     Objects,
     Materials,
     Picture,
@@ -56,7 +53,6 @@ impl Section {
             Self::Camera => "camera",
             Self::Surroundings => "surroundings",
             Self::Lights => "lights",
-            Self::Mirrors => "mirrors",
             Self::Objects => "objects",
             Self::Materials => "materials",
             Self::Picture => "picture",
@@ -64,17 +60,14 @@ impl Section {
     }
 }
 
-/// Returns all targets, each once, with their sections, in the order of the dashboard's list.
+/// Returns all targets, each once, with their sections, in the order of the dashboard's list, which is that of the file.
 pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     let mut list = vec![(Section::Camera, Target::Camera)];
     list.extend(scene.cameras.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
     list.push((Section::Surroundings, Target::Settings(SceneSettings::Ambient)));
     list.push((Section::Surroundings, Target::Settings(SceneSettings::Background)));
     list.extend((0..scene.lights.len()).map(|i| (Section::Lights, Target::Light(i))));
-    let reflects = |i: &usize| mirror_of(scene, slice::from_ref(&scene.objects[*i])).is_some();
-    let (mirrors, others): (Vec<_>, Vec<_>) = (0..scene.objects.len()).partition(reflects);
-    list.extend(mirrors.into_iter().map(|i| (Section::Mirrors, Target::Object(i))));
-    list.extend(others.into_iter().map(|i| (Section::Objects, Target::Object(i))));
+    list.extend((0..scene.objects.len()).map(|i| (Section::Objects, Target::Object(i))));
     let materials = scene.materials.keys();
     list.extend(materials.map(|name| (Section::Materials, Target::Material(name.clone()))));
     list.push((Section::Picture, Target::Settings(SceneSettings::Film)));

@@ -36,7 +36,7 @@ pub enum DefaultValue {
 pub enum Step {
     /// Step by this number; a fine step is a tenth of it.
     Units(f64),
-    /// Geometric step along the rungs: 1, 1.1, 1.2 ... 9, times any power of ten. The sign stays.
+    /// Geometric step along the rungs: 1, 1.25, 1.6 ... 8, times any power of ten. The sign stays.
     /// There are no rungs between 0 and this number.
     Rungs(f64),
     /// Step by doubling or halving, or by 1 in fine steps. The step up from 0 leads to 1.

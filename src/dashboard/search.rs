@@ -1,0 +1,77 @@
+//! Search in lists: which entries match the typed words, and in which order.
+
+use crate::dashboard::PickEntry;
+
+/// First words of actions that take others back. They come last unless they are typed.
+const OPPOSITES: [&str; 4] = ["cancel", "close", "leave", "reset"];
+
+/// Returns the words of `text` in lower case.
+fn words(text: &str) -> Vec<String> {
+    let words = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+    words.map(str::to_lowercase).collect()
+}
+
+/// Returns `true` if each of the words `wanted` is the beginning of a word of `text`.
+pub fn has_words(text: &str, wanted: &str) -> bool {
+    let own = words(text);
+    words(wanted).iter().all(|word| own.iter().any(|own| own.starts_with(word)))
+}
+
+/// Returns the rank of `entry` among the matches of `wanted`; the smallest comes first. Returns
+/// `None` if the entry does not match: each word must begin or be in a word of the name, begin one
+/// of the other words, or have its letters in the name, in this order.
+pub fn rank(wanted: &str, entry: &PickEntry) -> Option<usize> {
+    let (wanted, name) = (words(wanted), words(&entry.name));
+    if wanted == name {
+        return Some(0);
+    }
+    let also = words(&format!("{} {}", entry.also, entry.note));
+    let letters = name.concat();
+    let rank_of = |word: &String| {
+        let begins = |own: &String| own.starts_with(word);
+        let has_letters = || {
+            let mut left = letters.chars();
+            word.chars().all(|c| left.any(|letter| letter == c))
+        };
+        match word {
+            _ if name.first().is_some_and(begins) => Some(1),
+            _ if name.iter().any(begins) => Some(2),
+            _ if also.iter().any(begins) => Some(3),
+            _ if letters.contains(word) => Some(8),
+            _ if has_letters() => Some(16),
+            _ => None,
+        }
+    };
+    let mut rank = wanted.iter().map(rank_of).sum::<Option<usize>>()?;
+    let first = name.first().map_or("", String::as_str);
+    if OPPOSITES.contains(&first) && !wanted.iter().any(|word| first.starts_with(word)) {
+        rank += 4;
+    }
+    Some(rank)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(name: &str, also: &str) -> PickEntry {
+        let (name, also) = (name.to_string(), also.to_string());
+        PickEntry { name, also, note: String::new(), keys: String::new() }
+    }
+
+    #[test]
+    fn word_starts_precede_and_opposites_follow() {
+        let write = entry("write a PNG", "export image");
+        let cancel = entry("cancel the running export", "");
+        let place = |text: &str, entry| rank(text, entry).unwrap_or(usize::MAX);
+        let before = |text: &str| place(text, &write) < place(text, &cancel);
+        assert!(before("export") && before("exp") && !before("running"));
+        assert_eq!(rank("cancel", &cancel), Some(1));
+        let rough = entry("roughness of mirror", "blur");
+        assert_eq!(rank("roughness of mirror", &rough), Some(0));
+        assert_eq!([rank("rough mir", &rough), rank("blur", &rough)], [Some(3), Some(3)]);
+        assert!(rank("rgm", &rough) > rank("ness", &rough));
+        assert_eq!(rank("zebra", &rough), None);
+        assert!(has_words("color.r", "col r") && !has_words("color.r", "olor"));
+    }
+}

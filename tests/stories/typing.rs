@@ -1,0 +1,175 @@
+//! Stories of stray keys: in no widget does text that is typed run a command.
+
+use super::*;
+
+/// Keys that a hand may hit anywhere, and that must change nothing.
+const STRAY: [&str; 11] = ["b", ".", "4", ",", "<", ">", "(", ")", "+", "-", "#"];
+
+/// Returns the keys of all commands, except those that confirm, move or leave.
+fn commands() -> Vec<&'static str> {
+    let names =
+        COMMANDS.iter().flat_map(|command| command.keys).flat_map(|(_, keys)| keys.split(' '));
+    let moves =
+        ["Enter", "Esc", "Tab", "Ctrl-s", "Ctrl-c", "Ctrl-z", "Up", "Down", "PageUp", "PageDown"];
+    names
+        .filter(|name| !moves.iter().any(|key| name.trim_start_matches("Shift-") == *key))
+        .collect()
+}
+
+fn unchanged(desk: &mut Desk, place: &str, keys: &[&str]) {
+    let before = desk.text();
+    for key in keys {
+        desk.keys(key);
+        assert_eq!(desk.text(), before, "{key} in {place}");
+    }
+    desk.keys("Esc Esc Esc");
+    assert_eq!(desk.text(), before, "{place}");
+}
+
+#[test]
+fn stray_keys_change_nothing_on_any_row() {
+    let room = Desk::new(ROOM);
+    let parts = zerkalo_scene::edit::outline(room.scene());
+    for (_, subject) in parts {
+        for line in 0..usize::MAX {
+            let mut desk = Desk::new(ROOM);
+            desk.select(subject.clone());
+            desk.keys("Tab");
+            unchanged(&mut desk, "the outline", &STRAY);
+            desk.select(subject.clone());
+            desk.keys("Enter");
+            if line >= desk.model.field_lines().len() {
+                break;
+            }
+            desk.model.inspector.cursor = line;
+            unchanged(&mut desk, &format!("line {line} of {subject:?}"), &STRAY);
+        }
+    }
+}
+
+#[test]
+fn no_command_runs_while_text_is_typed() {
+    let ball = Target::Object(1);
+    for (place, keys) in [
+        ("an editor", "Enter / `rad` Enter Enter"),
+        ("the editor of a name", "Enter Home `pearl`"),
+        ("the filter", "Enter / `rad`"),
+        ("a form", "a Enter Down Down"),
+        ("an editor in a form", "a Enter `rad` Enter `2`"),
+        ("the kinds of objects", "a"),
+        ("a picker", "Enter Enter"),
+        ("the palette", ":"),
+        ("a prompt", "e"),
+        ("the noise targets", "N"),
+        ("a filter in a form", "a Enter `/rad`"),
+    ] {
+        let mut desk = Desk::new(ROOM);
+        desk.select(ball.clone());
+        desk.keys(keys);
+        unchanged(&mut desk, place, &commands());
+    }
+}
+
+/// Returns the names that the palette finds for `text`.
+fn found(text: &str) -> Vec<String> {
+    let mut desk = Desk::new(ROOM);
+    desk.keys(&format!(": `{text}`"));
+    let Some(Overlay::Pick(pick)) = &desk.model.overlay else { panic!("no palette") };
+    pick.found.iter().map(|i| pick.entries[*i].name.clone()).collect()
+}
+
+#[test]
+fn palette_finds_actions_fields_and_parts_by_other_words() {
+    for (text, first) in [
+        ("export", "write a PNG"),
+        ("rough", "roughness of mirror"),
+        ("resolution", "size of film"),
+        ("depth", "max depth of trace"),
+        ("rays", "rays per pixel of film"),
+        ("reload", "read the file again"),
+        ("image", "write a PNG"),
+        ("compare", "pin this picture"),
+        ("crisp", "mirror smoother"),
+        ("gold", "metal of mirror"),
+        ("ior", "ior of mirror"),
+        ("fov", "vertical of camera"),
+        ("floor", "select object \"floor\""),
+    ] {
+        assert!(found(text).iter().take(3).any(|name| name == first), "{text}: {:?}", found(text));
+    }
+    assert_eq!(found("export")[0], "write a PNG");
+    for text in ["zoom", "settings"] {
+        assert!(!found(text).is_empty(), "{text}");
+    }
+    let mut desk = Desk::new(ROOM);
+    desk.keys(": `light dark` Enter : `light`");
+    let Some(Overlay::Pick(pick)) = &desk.model.overlay else { panic!("no palette") };
+    assert_eq!(pick.entries[pick.found[0]].name, "light darker", "the latest comes first");
+}
+
+#[test]
+fn typed_commands_set_save_and_quit() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys(": `set roughness .3` Enter");
+    assert_eq!(desk.scene().materials["mirror"].roughness, 0.3);
+    desk.keys(": `set roughness *2` Enter");
+    assert_eq!(desk.scene().materials["mirror"].roughness, 0.6);
+    desk.keys(": `set eye.x 2` Enter : `set size 128x96` Enter");
+    assert_eq!((desk.scene().camera.eye[0], desk.scene().film.size), (2.0, [128, 96]));
+    desk.keys(": `set roughness -1` Enter");
+    assert!(desk.notice().contains("roughness is -1") && desk.model.overlay.is_some());
+    desk.keys("Esc : `set colour red` Enter");
+    assert!(desk.notice().contains("no field"), "{}", desk.notice());
+    desk.keys("Esc : `w copy` Enter");
+    assert!(desk.disk.contains_key(Path::new("copy.toml")) && !desk.model.is_unsaved());
+    desk.keys("] : `wq` Enter");
+    assert!(desk.asked(|e| *e == Effect::Quit) && !desk.model.is_unsaved());
+}
+
+#[test]
+fn marked_parts_change_together() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Target::Object(1));
+    desk.keys("V Tab Down V m x `1` Enter");
+    let center = |desk: &Desk, i| {
+        zerkalo_scene::edit::bounds(desk.scene(), &Target::Object(i)).unwrap().center
+    };
+    assert_eq!([center(&desk, 1).x, center(&desk, 2).x], [1.0, 1.0]);
+    desk.keys("r `180` Enter");
+    // They rotate about the point between them.
+    assert_eq!([center(&desk, 1).z, center(&desk, 2).z], [-2.0, 0.0]);
+    desk.keys("u u");
+    assert_eq!(desk.text(), ROOM, "two steps");
+    desk.select(Target::Object(1));
+    desk.keys("V Tab Down V D Right Enter");
+    assert_eq!((desk.scene().objects.len(), desk.model.marked.len()), (5, 2));
+    desk.keys("x");
+    assert_eq!(desk.scene().objects.len(), 3, "the copies are gone");
+}
+
+#[test]
+fn deletion_takes_only_what_was_selected_and_undo_selects_it() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Target::Object(1));
+    desk.keys("x");
+    assert!(desk.notice().contains("ball deleted"), "{}", desk.notice());
+    desk.keys("x");
+    assert_eq!(desk.scene().objects.len(), 2, "{}", desk.notice());
+    assert!(desk.notice().contains("glass is selected"), "{}", desk.notice());
+    desk.select(Target::Camera);
+    desk.keys("u");
+    assert_eq!(desk.model.selection, Target::Object(1));
+    assert_eq!(desk.text(), ROOM);
+}
+
+#[test]
+fn colours_and_calculations_are_typed_into_fields() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Target::Material("red".into()));
+    desk.keys("Enter / `col` Enter Enter `gold` Enter");
+    let gold = zerkalo_scene::value::Color::from_hex("#ffd700").unwrap();
+    assert_eq!(desk.scene().materials["red"].color, gold);
+    desk.keys("/ `refl` Enter `.25` Enter Up *");
+    desk.keys("`2` Enter");
+    assert_eq!(desk.scene().materials["red"].reflection, 0.5);
+}
