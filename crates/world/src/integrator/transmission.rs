@@ -119,20 +119,24 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let geometry = &world.geometry;
         let mut hit = geometry.closest_masked(&branch.path.ray, &candidates.primary, branch.lanes);
         let behind = self.behind(branch, &mut hit);
-        // Paths and media are large, so they are borrowed instead of copied.
-        let (path, stack, bounce) = (&mut branch.path, &branch.media, branch.bounce);
-        let media = Some(Media { nested_dielectrics: self.nested_dielectrics, stack });
+        let media =
+            Some(Media { nested_dielectrics: self.nested_dielectrics, stack: &branch.media });
         let emitters = world.lights.has_emitters();
         if emitters {
-            visible_emitters(world, path, hit.t, branch.lanes, media, out);
+            visible_emitters(world, &branch.path, hit.t, branch.lanes, media, out);
         }
-        let lanes = add_background(world, path, hit.t, branch.lanes, media, out);
+        let lanes = add_background(world, &mut branch.path, hit.t, branch.lanes, media, out);
         let Some(first) = next_distinct(hit.primitive, lanes) else { return false };
-        let mut interaction = interact::<_, false>(world, &path.ray, &hit, first, lanes);
-        let (ray, behind) = (&path.ray, behind.as_ref());
-        let coincident = self.cross_first(ray, stack, &mut hit, &mut interaction, lanes, behind);
+        let mut interaction = interact::<_, false>(world, &branch.path.ray, &hit, first, lanes);
+        let coincident =
+            self.cross_first(branch, &mut hit, &mut interaction, lanes, behind.as_ref());
         let reversed = coincident.as_ref().map(CoincidentState::reversed);
-        let interface_hit = self.interface_hit(&mut interaction, lanes, stack);
+        // Paths and media are large, so they are borrowed instead of copied.
+        let (path, stack, bounce) = (&mut branch.path, &branch.media, branch.bounce);
+        let interface_hit = self.interface_hit(&interaction, lanes, stack);
+        if let Some(hit) = &interface_hit {
+            interaction.mask_out(hit.suppressed);
+        }
         let interaction = &interaction;
         let mut vertex =
             Vertex { world, path, interaction, candidates, sampler, bounce, media, out };
@@ -167,26 +171,39 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
 
     /// Orders coincident surfaces: replaces `hit` and `interaction` in those of `lanes` that hit
     /// several surfaces at one place by the surface that takes effect first. `behind` is the next
-    /// coincident surface of rays that start on one, and `media` are the media of the rays. Returns
-    /// the state with which transmitted rays look for the following surface; `None` if no surfaces
-    /// coincide.
-    #[inline(never)]
+    /// coincident surface of rays that start on one. Returns the state with which transmitted rays
+    /// look for the following surface; `None` if no surfaces coincide.
+    #[inline(always)]
     fn cross_first(
         &self,
-        ray: &Ray<L>,
-        media: &MediumStack<L>,
+        branch: &Branch<L>,
         hit: &mut Hit<L>,
         interaction: &mut SurfaceInteraction<L>,
         lanes: L::Mask,
         behind: Option<&CoincidentQuery<L>>,
     ) -> Option<CoincidentState<L>> {
-        let world = self.base.world;
         let contacts = self.nested_dielectrics.contacts.as_ref()?;
         let uncrossed = lanes.and_not(behind.map_or(L::mask(false), |next| next.lanes));
-        let contact_lanes = contacts.near(interaction.primitive, interaction.point, uncrossed);
-        if behind.is_none() && contact_lanes.none() {
+        let near = contacts.near(interaction.primitive, interaction.point, uncrossed);
+        if behind.is_none() && near.none() {
             return None;
         }
+        self.cross_contacts(branch, hit, interaction, lanes, near, behind)
+    }
+
+    /// Continues [`Self::cross_first`], where the lanes `contact_lanes` may hit several surfaces.
+    #[inline(never)]
+    fn cross_contacts(
+        &self,
+        branch: &Branch<L>,
+        hit: &mut Hit<L>,
+        interaction: &mut SurfaceInteraction<L>,
+        lanes: L::Mask,
+        contact_lanes: L::Mask,
+        behind: Option<&CoincidentQuery<L>>,
+    ) -> Option<CoincidentState<L>> {
+        let world = self.base.world;
+        let contacts = self.nested_dielectrics.contacts.as_ref()?;
         let (mut layer, mut offset, mut coincident_lanes) =
             (L::zero(), interaction.offset, L::mask(false));
         if let Some(next) = behind {
@@ -196,12 +213,13 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         if contact_lanes.any() {
             let coincident = CoincidentState::behind(interaction, contact_lanes, L::zero());
             let leaves = !interaction.front;
-            let first = contacts.first(&world.geometry, &coincident, leaves, media);
+            let first = contacts.first(&world.geometry, &coincident, leaves, &branch.media);
             if first.lanes.any() {
                 let CoincidentQuery { primitive, triangle, .. } = first;
                 hit.replace(first.lanes, &Hit { t: hit.t, primitive, triangle });
                 if let Some(distinct) = next_distinct(hit.primitive, lanes) {
-                    *interaction = interact::<_, false>(world, ray, hit, distinct, lanes);
+                    *interaction =
+                        interact::<_, false>(world, &branch.path.ray, hit, distinct, lanes);
                     offset = offset.max(interaction.offset);
                 }
             }
@@ -219,11 +237,10 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         coincident_lanes.any().then_some(coincident)
     }
 
-    /// Returns the hits of `lanes` on transmissive surfaces, and removes the BSDF from suppressed
-    /// ones. Returns `None` if no lane hits such a surface.
+    /// Returns the hits of `lanes` on transmissive surfaces; `None` if no lane hits such a surface.
     fn interface_hit(
         &self,
-        interaction: &mut SurfaceInteraction<L>,
+        interaction: &SurfaceInteraction<L>,
         lanes: L::Mask,
         media: &MediumStack<L>,
     ) -> Option<InterfaceHit<L>> {
@@ -235,9 +252,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 index = L::select(bsdf_lanes, L::splat(transmission.index), index);
             }
         }
-        let hit = self.nested_dielectrics.cross(interaction, transmissive, media, index)?;
-        interaction.mask_out(hit.suppressed);
-        Some(hit)
+        self.nested_dielectrics.cross(interaction, transmissive, media, index)
     }
 
     /// Finds the surface that rays of `branch` cross next if they start on one of several
