@@ -89,8 +89,9 @@ impl<L: SimdFloat> MediumStack<L> {
     }
 }
 
+/// Returns the lanes in which `a` and `b` are equal.
 #[inline(always)]
-fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
+pub(crate) fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
     a.le(b) & b.le(a)
 }
 
