@@ -128,6 +128,7 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
             ray: Ray { origin: self.origin, direction },
             throughput: Path::bounded(self.throughput * scale),
             lobe_pdf: L::from_f64(NO_PDF),
+            passed: L::zero(),
         };
         let lanes = self.lanes
             & direction.dot(self.geometric).gt(L::zero())
