@@ -6,6 +6,7 @@
 mod acceleration;
 mod agreement;
 mod big_picture;
+mod clear_panes;
 mod determinism;
 mod emitters;
 mod environment;

@@ -95,6 +95,7 @@ fn closed_form_7_a_white_furnace_is_exact() {
 /// diffuse objects need the bounce.
 #[test]
 fn white_ball_is_white_in_every_furnace() {
+    let narrow = &*format!("{GLASS}\nroughness = 1e-6");
     let materials = [
         "diffuse = 1",
         "diffuse = 0.5\nreflection = 0.5\nroughness = 0.2",
@@ -103,7 +104,12 @@ fn white_ball_is_white_in_every_furnace() {
         "reflection = 1\nroughness = 0.5",
         "reflection = 1\nroughness = 0.4\nlobe = \"square\"",
         "reflection = 1\nroughness = 1.5\nlobe = \"square\"",
+        "reflection = 1\nroughness = 1e-5",
+        "reflection = 1\nroughness = 1e-7",
+        "reflection = 1\nroughness = 1e-6\nlobe = \"square\"",
+        "reflection = 1\nroughness = 1e-30\nlobe = \"square\"",
         GLASS,
+        narrow,
     ];
     let mut cases = Vec::new();
     for (i, surroundings) in SAMPLED.into_iter().enumerate() {

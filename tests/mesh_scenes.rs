@@ -286,3 +286,59 @@ fn the_inventory_counts_triangles() {
     let inventory = AnyWorld::compile(&scene, &Options::default()).info().inventory.clone();
     assert!(inventory.contains("4 meshes of 23,106 triangles (list)"), "{inventory}");
 }
+
+/// Returns a rod along y as OBJ, of 64 strips of two triangles.
+fn rod(radius: f64, length: f64) -> String {
+    let mut text = String::new();
+    for side in 0..64 {
+        let (sin, cos) = (TAU * f64::from(side) / 64.0).sin_cos();
+        for y in [-0.5, 0.5] {
+            writeln!(text, "v {} {} {}", radius * cos, y * length, -radius * sin).unwrap();
+        }
+    }
+    for side in 0..64 {
+        let [a, b] = [side, (side + 1) % 64].map(|side| 2 * side + 1);
+        writeln!(text, "f {a} {b} {}\nf {a} {} {}", b + 1, b + 1, a + 1).unwrap();
+    }
+    text
+}
+
+/// Checks that rods and planks of long, thin triangles are white in a white furnace, to a ratio of
+/// length to width of 1e4 in single and 1e6 in double precision: strips do not shade themselves.
+#[test]
+fn long_thin_triangles_are_white_in_a_furnace() {
+    let desk = Desk::new();
+    desk.put("plank.obj", "v -50 0 -.05\nv 50 0 -.05\nv 50 0 .05\nv -50 0 .05\nf 1 3 2\nf 1 4 3\n");
+    let materials = [
+        "diffuse = 1",
+        "reflection = 1\ndiffuse = 0",
+        "reflection = 1\nroughness = 0.3\ndiffuse = 0",
+    ];
+    let white = |file: &str, width: f64, distance: f64, material: &str, precision| {
+        let scene = desk.scene(&format!(
+            "film.size = [32, 24]
+             camera = {{ eye = [0.1, 0.3, 1.0], target = [0, 0, 0], view_angle.vertical = {:?} }}
+             [[light]]\nenvironment = {{}}
+             [materials.white]\ncolor = [1, 1, 1]\nambient = 0\n{material}
+             [[object]]\nmaterial = \"white\"\nshape.mesh = {{ file = \"{file}\", normals = \"flat\" }}
+             transform = [{{ rotate_z = 80.0 }}, {{ rotate_x = 17.0 }}, {{ rotate_y = 23.0 }}]",
+            (width / distance).to_degrees()
+        ));
+        let pixels = picture(&rendered(&scene, 3, precision, 32), Replicates::Both);
+        let mean = pixels.iter().map(|pixel| pixel[0]).sum::<f64>() / pixels.len() as f64;
+        assert!((mean - 1.0).abs() < 1e-3, "{file}, {material}, {precision:?}: {mean}");
+    };
+    for material in materials {
+        for aspect in [2e2, 2e3, 1e4, 1e6] {
+            let radius = 64.0 / (TAU * aspect);
+            let rod_file = format!("rod{aspect}.obj");
+            desk.put(&rod_file, &rod(radius, 1.0));
+            if aspect <= 1e4 {
+                white(&rod_file, radius, 1.0, material, Precision::Single);
+            }
+            white(&rod_file, radius, 1.0, material, Precision::Double);
+        }
+        white("plank.obj", 0.03, 1.0, material, Precision::Single);
+        white("plank.obj", 0.03, 1.0, material, Precision::Double);
+    }
+}

@@ -228,3 +228,21 @@ fn inside_of_an_emissive_sphere_has_shadows() {
     let cos2 = 0.25 / 4.0;
     check_means(&[("band".to_string(), scene, cos2)], 1 << 15, [1e-3, 1e-6]);
 }
+
+/// Checks that a glowing glass ball inside a glass listed later, which hides it, lights nothing.
+#[test]
+fn hidden_glowing_glass_lights_nothing_inside_the_glass_that_hides_it() {
+    let scene = parsed(
+        "film.size = [8, 6]
+         camera = { eye = [0, 0.2, 1.5], target = [0, -0.3, 0], view_angle.vertical = 40 }
+         [materials.glowing]\ncolor = [0, 0, 0]\nambient = 0\nemission = 3\ntransmission = 1
+         [materials.glass]\nambient = 0\ndiffuse = 0\ntransmission = 1\nior = 1.5
+         [[object]]\nmaterial = \"glowing\"\nshape.sphere = { center = [0, 0.5, 0], radius = 0.3 }
+         [[object]]\nshape.box = { center = [0, -0.5, 0], size = [1, 0.5, 1] }
+         [[object]]\nmaterial = \"glass\"\nshape.sphere = { center = [0, 0, 0], radius = 3 }",
+    );
+    assert!(samples::<Single>(&scene, 16).iter().all(|sample| *sample == [0.0; 3]));
+    let mut shown = scene.clone();
+    shown.objects.rotate_right(1);
+    assert!(samples::<Single>(&shown, 16).iter().any(|sample| sample[0] > 0.0));
+}

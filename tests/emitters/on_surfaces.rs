@@ -219,3 +219,34 @@ fn emissive_sheets_on_sheets_show_on_the_side_of_the_eye() {
     }
     check_means(&cases, 4096, ROUNDING);
 }
+
+/// Checks that lamps on tilted ceilings light the room where all coordinates are rounded to nine
+/// decimals, as people write them: some lamps are then behind their ceiling.
+#[test]
+fn lamps_on_tilted_ceilings_with_written_coordinates_light_the_room() {
+    let mut numbers = Numbers::new(1);
+    for i in 0..40 {
+        let written = |v: DVec3| (v * 1e9).round() / 1e9;
+        let normal = written((numbers.direction() * 0.4 - DVec3::Y).normalize());
+        let center = written(DVec3::Y * 2.0 + numbers.in_cube(0.3));
+        let side = normal.any_orthonormal_vector();
+        let lamp = array(written(center + side * 0.7 + side.cross(normal) * 0.5));
+        let normal = array(normal);
+        let rectangle =
+            format!("rectangle = {{ center = {lamp}, size = [0.4, 0.3], normal = {normal} }}");
+        let ceiling = format!(
+            "[[object]]\nmaterial = \"black\"\n\
+             shape.rectangle = {{ center = {}, size = [4, 4], normal = {normal} }}\n",
+            array(center)
+        );
+        for lamp in [
+            format!("[[light]]\npoint = {{ position = {lamp} }}"),
+            format!("[[light]]\n{rectangle}"),
+            format!("[[object]]\nmaterial = \"lamp\"\nshape.{rectangle}"),
+        ] {
+            let scene = receiver(DVec3::Y, WHITE, &format!("{ceiling}{lamp}\n"));
+            let lit = [radiance::<Single>(&scene, 64, 1).0, radiance::<Double>(&scene, 64, 1).0];
+            assert!(lit.iter().all(|lit| *lit > 1e-3), "{i}: {lit:?} under\n{lamp}\n{ceiling}");
+        }
+    }
+}

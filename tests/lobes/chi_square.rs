@@ -102,12 +102,12 @@ impl Chart {
         let revolution = |x: f64, y: f64| (y.atan2(x) / TAU).rem_euclid(1.0);
         match self.spread {
             ReflectionLobe::Mirror => unreachable!(),
-            ReflectionLobe::Cone { one_minus_cos } => {
+            ReflectionLobe::Cone { one_minus_cos, .. } => {
                 let [t, b, m] = self.frame;
                 let off = combine(&[(1.0, d), (-1.0, m)]);
                 [0.5 * dot(off, off) / one_minus_cos, revolution(dot(d, t), dot(d, b))]
             }
-            ReflectionLobe::Square { side } => {
+            ReflectionLobe::Square { side, .. } => {
                 let [t, b, m] = self.frame;
                 let z = dot(d, m);
                 [dot(d, t) / (z * side) + 0.5, dot(d, b) / (z * side) + 0.5]
@@ -131,14 +131,14 @@ impl Chart {
         let (sin, cos) = (TAU * q).sin_cos();
         match self.spread {
             ReflectionLobe::Mirror => unreachable!(),
-            ReflectionLobe::Cone { one_minus_cos } => {
+            ReflectionLobe::Cone { one_minus_cos, .. } => {
                 let [t, b, m] = self.frame;
                 let drop = p * one_minus_cos;
                 let s = (drop * (2.0 - drop)).sqrt();
                 let d = combine(&[(1.0 - drop, m), (s * cos, t), (s * sin, b)]);
                 (d, TAU * one_minus_cos)
             }
-            ReflectionLobe::Square { side } => {
+            ReflectionLobe::Square { side, .. } => {
                 let [t, b, m] = self.frame;
                 let d = unit(combine(&[(1.0, m), ((p - 0.5) * side, t), ((q - 0.5) * side, b)]));
                 (d, side * side * dot(d, m).powi(3))

@@ -61,7 +61,7 @@ struct Edge {
 
 fn edge(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, delta: f64, phi: f64) -> Edge {
     let (frame, share) = match spread {
-        ReflectionLobe::Square { side } => {
+        ReflectionLobe::Square { side, .. } => {
             let frame = Frame::around(Vec3::<f64>::of(n));
             ([vector(frame.t), vector(frame.b)], square_share(*side, delta.tan(), phi))
         }
@@ -200,7 +200,7 @@ fn closed_form_05_density_of_the_square() {
         let expected = (1.0 + 2.0 * (0.499 * side).powi(2)).powf(1.5);
         assert!((corner / middle / expected - 1.0).abs() < 1e-12);
     }
-    let ReflectionLobe::Square { side } = spread_of(Lobe::Square, 0.2) else { panic!() };
+    let ReflectionLobe::Square { side, .. } = spread_of(Lobe::Square, 0.2) else { panic!() };
     assert!((side - PI.sqrt() * 0.2).abs() < 1e-15);
 }
 
@@ -228,7 +228,7 @@ fn horizon<L: SimdFloat>(tolerance: f64) {
             let mut material = reflector(lobe, Masking::VCavity, roughness);
             material.reflection = rho;
             let share = match spread_of(lobe, roughness) {
-                ReflectionLobe::Square { side } => {
+                ReflectionLobe::Square { side, .. } => {
                     // The sides of the square are those of the frame that the program computes
                     // about the mirror direction.
                     let kernel = Vec3::<L>::of(incident).reflect(Vec3::of(n)).normalize();

@@ -104,7 +104,15 @@ fn packets_equal_samples_traced_alone() {
     }
     let glass = ["glass.toml", "transmission.toml", "water-glass.toml"]
         .map(|file| (file, sized(shipped(file), [24, 20])));
-    let others = [("lobe", lobe), ("no reflection", lambert), ("ideal mirror", mirror)];
+    // Mirrors and matt surfaces side by side, in packets that offer different numbers of hits.
+    let mut bounce = mirror.clone();
+    bounce.trace.max_diffuse_depth = 1;
+    let others = [
+        ("lobe", lobe),
+        ("no reflection", lambert),
+        ("ideal mirror", mirror),
+        ("one diffuse bounce", bounce),
+    ];
     for (name, scene) in others.into_iter().chain(glass) {
         assert!(samples::<Single>(&scene, 8) == lone_samples::<Single>(&scene, 8), "{name}");
         assert!(samples::<Double>(&scene, 8) == lone_samples::<Double>(&scene, 8), "{name}");

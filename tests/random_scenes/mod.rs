@@ -26,6 +26,7 @@ macro_rules! scene_tests {
 }
 
 mod accelerations;
+mod divisions;
 mod driver;
 mod gaps;
 mod layouts;

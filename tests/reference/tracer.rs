@@ -74,7 +74,7 @@ pub struct Tracer<'a> {
     /// Images of textures and bump maps, by file name.
     pub images: HashMap<String, Pixels>,
     /// Materials of the simple shapes of each body.
-    materials: Vec<Vec<&'a Material>>,
+    pub materials: Vec<Vec<&'a Material>>,
     /// `true` if some material absorbs light.
     pub absorbs: bool,
     pub mutation: Mutation,
@@ -209,6 +209,7 @@ impl<'a> Tracer<'a> {
             if !hit.bare && (sees_sky || self.shines[hit.body].is_none()) {
                 own = DVec3::from(hit.material.emitted());
             }
+            let before = (sees_lamps, sees_sky);
             (sees_lamps, sees_sky) = (true, true);
             let through = trace.ray_types == RayTypes::Full && hit.material.transmission > 0.0;
             if through && trace.max_depth > 0 {
@@ -225,6 +226,10 @@ impl<'a> Tracer<'a> {
                     return radiance;
                 };
                 weight *= factor;
+                // Light that a pane lets through reaches the surface before it by shadow rays.
+                if next == direction && self.is_clear_pane(hit.body) {
+                    (sees_lamps, sees_sky) = before;
+                }
                 (origin, direction) = (hit.point, next);
                 continue;
             }
@@ -385,11 +390,12 @@ impl<'a> Tracer<'a> {
                 continue;
             };
             let distance = distance * (1.0 - 1e-9);
-            if hit.normal.dot(towards) <= 0.0 || self.in_shadow(hit.point, towards, distance) {
+            let passed = self.passed(hit.point, towards, distance);
+            if hit.normal.dot(towards) <= 0.0 || passed == 0.0 {
                 continue;
             }
             let value = wide_lobe(m, hit.seen, view, towards, horizon)?;
-            let radiance = light.intensity * lamp.radiance(light.unit);
+            let radiance = light.intensity * lamp.radiance(light.unit) * passed;
             sum += value * DVec3::from(light.color.0) * (radiance * irradiance);
         }
         Some(sum)
@@ -454,9 +460,11 @@ impl<'a> Tracer<'a> {
             };
             let mut cos = hit.seen.dot(towards);
             let behind = cos <= 0.0 || hit.normal.dot(towards) <= 0.0;
-            if behind || self.in_shadow(hit.point, towards, distance) {
+            let passed = if behind { 0.0 } else { self.passed(hit.point, towards, distance) };
+            if passed == 0.0 {
                 continue;
             }
+            let irradiance = irradiance * passed;
             let shine = highlight(m, hit.seen, view, towards);
             if i == 0 && self.mutation == Mutation::NoCosine {
                 cos = 1.0;
@@ -478,28 +486,50 @@ impl<'a> Tracer<'a> {
             }
             let cos = hit.seen.dot(towards);
             let behind = cos <= 0.0 || hit.normal.dot(towards) <= 0.0 || cos_there <= 0.0;
-            if behind || self.in_shadow(hit.point, towards, distance * (1.0 - 1e-9)) {
+            let end = distance * (1.0 - 1e-9);
+            let passed = if behind { 0.0 } else { self.passed(hit.point, towards, end) };
+            if passed == 0.0 {
                 continue;
             }
             if self.mutation == Mutation::NoEmissionCosine {
                 cos_there = 1.0;
             }
-            let irradiance =
-                DVec3::from(material.emitted()) * (area * cos_there / (distance * distance));
+            let irradiance = DVec3::from(material.emitted())
+                * (passed * area * cos_there / (distance * distance));
             let highlight = highlight(m, hit.seen, view, towards);
             sum += irradiance * (color * (m.diffuse * cos / PI) + highlight);
         }
         sum
     }
 
-    fn in_shadow(&self, point: DVec3, towards: DVec3, distance: f64) -> bool {
+    /// Returns the fraction of light that reaches `point` from the direction `towards` and `distance`:
+    /// clear panes let a part of it through, other bodies nothing.
+    fn passed(&self, point: DVec3, towards: DVec3, distance: f64) -> f64 {
         if self.scene.trace.ray_types == RayTypes::Primary {
-            return false;
+            return 1.0;
         }
         let offset = if self.mutation == Mutation::ShadowOffset { 1e-3 } else { 0.0 };
         let from = Self::clearance(point) + offset;
         let end = distance * (1.0 - 1e-12);
-        self.bodies.iter().any(|body| body.meet(point, towards, from, end).is_some())
+        let met = |i: usize| self.bodies[i].meet(point, towards, from, end).is_some();
+        let (panes, others): (Vec<_>, Vec<_>) =
+            (0..self.bodies.len()).partition(|i| self.is_clear_pane(*i));
+        if others.into_iter().any(met) {
+            return 0.0;
+        }
+        if !panes.into_iter().any(met) {
+            return 1.0;
+        }
+        let (mut origin, mut left, mut passed) = (point, end, 1.0);
+        while let Some(hit) = self.meet(origin, towards) {
+            left -= hit.point.distance(origin);
+            if left <= 0.0 {
+                break;
+            }
+            passed *= self.pane_transmittance(&hit, towards);
+            origin = hit.point;
+        }
+        passed
     }
 }
 

@@ -81,6 +81,21 @@ impl Tracer<'_> {
         DVec3::from(material.attenuation_color.0.map(left))
     }
 
+    /// Returns `true` if body `i` is a pane without roughness, through which lights shine.
+    pub fn is_clear_pane(&self, i: usize) -> bool {
+        let (trace, material) = (&self.scene.trace, self.materials[i][0]);
+        let traced = trace.ray_types == RayTypes::Full && trace.max_depth > 0;
+        traced && self.bodies[i].is_open() && material.transmission > 0.0 && is_sharp(material)
+    }
+
+    /// Returns the share of light in the direction `direction` that the pane at `hit` transmits.
+    pub fn pane_transmittance(&self, hit: &Hit, direction: DVec3) -> f64 {
+        let (_, n_i) = self.medium(hit.point + hit.normal * ASIDE);
+        let (f, _) = self.reflectance(hit, -direction.dot(hit.seen), (n_i, hit.material.ior));
+        let dielectric = hit.material.fresnel_mode() == Fresnel::Dielectric;
+        hit.material.transmission * if dielectric { 1.0 - f } else { 1.0 }
+    }
+
     /// Chooses reflection or transmission at random for a ray in the direction `direction` that
     /// hits a transmitting material.
     pub fn through(&self, hit: &Hit, direction: DVec3, numbers: &mut Numbers) -> Way {

@@ -13,7 +13,7 @@ use crate::lights::choice::LightChoice;
 use crate::lights::emissive_sheets::{Emits, move_off_surfaces};
 use crate::lights::emitters::{Emitters, ObjectGeometry};
 use crate::lights::groups::{LightGroupSource, LightGroups};
-use crate::lights::on_surfaces::OnSurface;
+use crate::lights::on_surfaces::{OnSurface, WRITTEN};
 use crate::world::{DeltaSource, EnvironmentSource, ShadowRayTarget, World, WorldInfo};
 use glam::{DAffine3, DVec3};
 use std::collections::{HashMap, HashSet};
@@ -191,11 +191,16 @@ fn light_lift<S: Float>(geometry: &RecenteredGeometry, surface: &EmissiveSurface
         return lift.min(max_lift);
     }
     let lift_on = |form: &Form| {
-        let lift = if form.bounds().is_some() { lift } else { lift_on_infinite };
-        if lift <= max_lift && form.bounds().is_some() {
+        let (lift, size) = match form.bounds() {
+            Some(_) => (lift, geometry.extent),
+            None => (lift_on_infinite, geometry.extent.max(largest)),
+        };
+        let written = WRITTEN * size;
+        if lift <= max_lift && lift >= written && form.bounds().is_some() {
             return None;
         }
-        form.clearance(center).filter(|distance| *distance <= lift).map(|_| lift)
+        let distance = form.clearance(center)?;
+        if distance <= lift { Some(lift) } else { (distance <= written).then_some(2.0 * written) }
     };
     let lifts = geometry.forms.iter().filter_map(lift_on);
     lifts.fold(lift.min(max_lift), f64::max)

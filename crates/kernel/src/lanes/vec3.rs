@@ -70,6 +70,21 @@ impl<L: SimdFloat> Vec3<L> {
             self.x.mul_add(o.y, -(self.y * o.x)),
         )
     }
+    /// Returns the cross product `self x o`, each coordinate with an error of two units in its last
+    /// place if multiply-add is fused (Kahan; Jeannerod, Louvet and Muller 2013, *Further Analysis of
+    /// Kahan's Algorithm for the Accurate Computation of 2x2 Determinants*).
+    #[inline(always)]
+    pub fn exact_cross(self, o: Self) -> Self {
+        let difference = |a: L, b: L, c: L, d: L| {
+            let product = c * d;
+            a.mul_add(b, -product) + (-c).mul_add(d, product)
+        };
+        Self::new(
+            difference(self.y, o.z, self.z, o.y),
+            difference(self.z, o.x, self.x, o.z),
+            difference(self.x, o.y, self.y, o.x),
+        )
+    }
     /// Returns the squared length.
     #[inline(always)]
     pub fn length_squared(self) -> L {

@@ -3,6 +3,7 @@
 use crate::light::{Environment, Spot};
 use glam::DVec3;
 use std::f64::consts::PI;
+use zerkalo_kernel::lanes::Vec3;
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum LightForm<'a> {
@@ -108,7 +109,17 @@ impl EmissiveSurface {
     }
 }
 
+/// Ratio of a triangle's length to its height above which [`doubled_normal`] is computed more exactly.
+const MAX_ASPECT: f64 = 64.0;
+
 /// Returns the normal of a triangle; its length is twice the triangle's area.
 pub(super) fn doubled_normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
-    (b - a).cross(c - a)
+    let edges = [b - a, c - a];
+    let normal = edges[0].cross(edges[1]);
+    let longest = edges[0].length_squared().max(edges[1].length_squared());
+    if longest <= MAX_ASPECT * normal.length() {
+        return normal;
+    }
+    let [u, v] = edges.map(|edge| Vec3::<f64>::of(edge.to_array()));
+    DVec3::from(u.exact_cross(v).lane(0))
 }

@@ -46,12 +46,16 @@ pub enum ReflectionLobe<S> {
     Cone {
         /// 1 - cos of the cone's half-angle.
         one_minus_cos: S,
+        /// 1 - cos of the half-angle of the cone of [`evaluated_roughness`].
+        evaluated: S,
     },
     /// Directions through uniform points of a square that is perpendicular to the axis and centred
     /// on it, at distance 1.
     Square {
         /// Side length of the square.
         side: S,
+        /// Side length of the square of [`evaluated_roughness`].
+        evaluated: S,
     },
     /// Reflection and refraction at visible microfacets.
     Microfacet(MicrofacetDistribution<S>),
@@ -113,6 +117,13 @@ fn one_minus_cos_of_tan(r: f64) -> f64 {
     if square.is_infinite() { 1.0 } else { square / (1.0 + square + (1.0 + square).sqrt()) }
 }
 
+/// Returns the roughness with which the lobes `Cone` and `Square` of the roughness `r` are evaluated:
+/// larger by the rounding errors of sampled directions, which would otherwise have the density 0.
+/// Where the errors lose less than 1 in 10,000 samples, it is `r`.
+fn evaluated_roughness<S: Float>(r: f64) -> f64 {
+    if r < S::EPSILON * f64::from(1 << 14) { r + 8.0 * S::EPSILON } else { r }
+}
+
 impl<S: Float> Bsdf<S> {
     /// Compiles `material`; without reflection and transmission if `reflects` is `false`.
     pub fn new(material: &Material, reflects: bool) -> Self {
@@ -133,15 +144,14 @@ impl<S: Float> Bsdf<S> {
             Highlight::CookTorrance => SpecularModel::Microfacet { strength, facets },
         };
         let r = material.roughness;
+        let wide = evaluated_roughness::<S>(r);
+        let cone = |r| S::from_f64(one_minus_cos_of_tan(r));
+        let side = |r| S::from_f64(std::f64::consts::PI.sqrt() * r);
         let lobe = match material.lobe {
             Lobe::Mirror => ReflectionLobe::Mirror,
             Lobe::Cone | Lobe::Square if r == 0.0 => ReflectionLobe::Mirror,
-            Lobe::Cone => {
-                ReflectionLobe::Cone { one_minus_cos: S::from_f64(one_minus_cos_of_tan(r)) }
-            }
-            Lobe::Square => {
-                ReflectionLobe::Square { side: S::from_f64(std::f64::consts::PI.sqrt() * r) }
-            }
+            Lobe::Cone => ReflectionLobe::Cone { one_minus_cos: cone(r), evaluated: cone(wide) },
+            Lobe::Square => ReflectionLobe::Square { side: side(r), evaluated: side(wide) },
             Lobe::Beckmann | Lobe::Ggx if material.microfacet_alpha() < SMOOTH_ALPHA => {
                 ReflectionLobe::Mirror
             }
@@ -251,8 +261,8 @@ pub(super) fn spread<L: SimdFloat>(
     (u, v): (L, L),
 ) -> Vec3<L> {
     let local = match lobe {
-        ReflectionLobe::Cone { one_minus_cos } => warp::cone(u, v, L::splat(*one_minus_cos)),
-        ReflectionLobe::Square { side } => warp::square(u, v, L::splat(*side)),
+        ReflectionLobe::Cone { one_minus_cos, .. } => warp::cone(u, v, L::splat(*one_minus_cos)),
+        ReflectionLobe::Square { side, .. } => warp::square(u, v, L::splat(*side)),
         ReflectionLobe::Mirror | ReflectionLobe::Microfacet(_) => return axis,
     };
     Frame::around(axis.renormalize()).to_world(local)
@@ -396,12 +406,12 @@ impl<S: Float> Bsdf<S> {
         let mirror = incident.reflect(n);
         match &self.lobe {
             ReflectionLobe::Mirror => L::zero(),
-            ReflectionLobe::Cone { one_minus_cos } => {
-                warp::cone_pdf(mirror, direction, L::splat(*one_minus_cos))
+            ReflectionLobe::Cone { evaluated, .. } => {
+                warp::cone_pdf(mirror, direction, L::splat(*evaluated))
             }
-            ReflectionLobe::Square { side } => {
+            ReflectionLobe::Square { evaluated, .. } => {
                 let local = Frame::around(mirror.renormalize()).to_local(direction);
-                warp::square_pdf(local, L::splat(*side))
+                warp::square_pdf(local, L::splat(*evaluated))
             }
             ReflectionLobe::Microfacet(facets) => {
                 let h = direction - incident;

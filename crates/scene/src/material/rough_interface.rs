@@ -168,12 +168,12 @@ impl<S: Float> Bsdf<S> {
         };
         let density = match &self.lobe {
             ReflectionLobe::Mirror => L::from_f64(L::MAX),
-            ReflectionLobe::Cone { one_minus_cos } => {
-                warp::cone_pdf(axis(), direction, L::splat(*one_minus_cos))
+            ReflectionLobe::Cone { evaluated, .. } => {
+                warp::cone_pdf(axis(), direction, L::splat(*evaluated))
             }
-            ReflectionLobe::Square { side } => {
+            ReflectionLobe::Square { evaluated, .. } => {
                 let local = Frame::around(axis()).to_local(direction);
-                warp::square_pdf(local, L::splat(*side))
+                warp::square_pdf(local, L::splat(*evaluated))
             }
             ReflectionLobe::Microfacet(facets) => {
                 facet(facets, query, direction, L::mask(true)).density

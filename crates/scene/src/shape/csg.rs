@@ -130,7 +130,7 @@ fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
             parts.push(solid);
         }
     }
-    CsgSolid { parts, tree: join(trees) }
+    CsgSolid::of_solids(parts, join(trees))
 }
 
 /// Returns the reason why `shape` cannot be a part of a compound; `None` if it can be one.

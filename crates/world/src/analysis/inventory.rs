@@ -42,11 +42,14 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
     let lights = &world.lights;
     let has_lights =
         !lights.delta_lights.is_empty() || lights.choice.is_some() || lights.has_emitters();
+    let nested_dielectrics = world.nested_dielectrics.as_ref();
+    let passes = nested_dielectrics.is_some_and(|nested| nested.clear_panes.is_some());
     let is_shared = |source: &LightGroupSource| matches!(source, LightGroupSource::Shared(_));
     parts.extend(present([
         (groups.iter().any(is_shared), "shared light group"),
         (groups.contains(&LightGroupSource::Ambient), "ambient"),
         (groups.contains(&LightGroupSource::Background), "background"),
+        (passes && has_lights, "shadow rays through clear panes"),
         (ray_types == RayTypes::Primary, "no shadows"),
         (ray_types == RayTypes::Shadows && has_lights, "shadows only"),
         (scene.film.filter == Filter::Point, "no anti-aliasing"),

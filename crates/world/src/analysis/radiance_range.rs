@@ -21,6 +21,7 @@
 use crate::analysis::clearance::clearance;
 use crate::compile::RecenteredGeometry;
 use glam::DVec3;
+use std::collections::HashMap;
 use std::f64::consts::{FRAC_1_PI, PI};
 use zerkalo_kernel::lanes::Float;
 use zerkalo_kernel::primitive::{BoundingSphere, Bounds, Form, box_distance};
@@ -116,7 +117,7 @@ fn ceil_log2(x: f64) -> f64 {
 }
 
 /// Factors by which materials reflect direct light, relative to a white diffuse surface.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Response {
     /// Smallest factor over all channels that are not black.
     least: f64,
@@ -182,9 +183,11 @@ struct LitBy {
 /// is computed.
 pub(crate) struct SceneDistances<'a> {
     forms: &'a [Form],
-    /// Direct light that each object reflects, over all its parts, relative to a white diffuse
-    /// surface; `None` if it reflects none.
-    responses: Vec<Option<Response>>,
+    /// Bounding box of each object; `None` for infinite objects.
+    boxes: Vec<Option<Bounds>>,
+    /// Direct light that objects reflect, over all their parts, relative to a white diffuse surface,
+    /// each with the objects that reflect it.
+    responses: Vec<(Response, Vec<usize>)>,
     /// Factors by which materials reflect ambient light.
     ambient: Response,
     /// Smallest factor, at most 1, by which pure mirrors and glass, which reflect no direct light,
@@ -217,7 +220,18 @@ impl<'a> SceneDistances<'a> {
             let parts = materials_of(form);
             parts.into_iter().filter_map(Response::new).reduce(Response::or)
         };
-        let responses = (0..forms.len()).map(response_of_form).collect();
+        let mut responses: Vec<(Response, Vec<usize>)> = Vec::new();
+        let mut index_of = HashMap::new();
+        for form in 0..forms.len() {
+            let Some(response) = response_of_form(form) else { continue };
+            let Response { least, most, peak } = response;
+            let index =
+                *index_of.entry([least, most, peak].map(f64::to_bits)).or_insert_with(|| {
+                    responses.push((response, Vec::new()));
+                    responses.len() - 1
+                });
+            responses[index].1.push(form);
+        }
         let materials: Vec<&Material> = (0..forms.len()).flat_map(&materials_of).collect();
         let ambient = || materials.iter().flat_map(|m| m.color.0.map(|c| c * m.ambient));
         let most = ambient().fold(0.0, f64::max);
@@ -241,6 +255,7 @@ impl<'a> SceneDistances<'a> {
         };
         Self {
             forms,
+            boxes: forms.iter().map(|form| form.bounds()).collect(),
             responses,
             ambient,
             faintest: faintest.unwrap_or(1.0).min(1.0),
@@ -253,7 +268,8 @@ impl<'a> SceneDistances<'a> {
 
     /// Returns the factors of all objects together; 1 if no object reflects direct light.
     fn response(&self) -> Response {
-        self.responses.iter().flatten().copied().reduce(Response::or).unwrap_or(Response::WHITE)
+        let responses = self.responses.iter().map(|(response, _)| *response);
+        responses.reduce(Response::or).unwrap_or(Response::WHITE)
     }
 
     /// Returns the range for ambient light of intensity 1.
@@ -376,17 +392,15 @@ impl<'a> SceneDistances<'a> {
         let LitBy { center, radius, min_distance, min_clearance } = *light;
         let (mut dimmest, mut brightest) = (f64::INFINITY, 0.0f64);
         let (mut spots, mut extreme) = (0.0f64, 0.0f64);
-        for (form, response) in self.forms.iter().zip(&self.responses) {
-            let Some(response) = response else { continue };
-            let clearance = form.clearance(center).unwrap_or(0.0);
-            let near = clearance - radius;
-            if clearance > min_clearance {
+        for (response, objects) in &self.responses {
+            let (least_clearance, far) = self.reach(objects, &(center, radius), min_clearance);
+            if least_clearance < f64::INFINITY {
+                let near = least_clearance - radius;
                 let nearest = radiance_at(near.max(min_distance));
                 brightest = brightest.max(nearest * response.most);
                 spots = spots.max(radiance_at(near.max(0.0)) * response.most);
                 extreme = extreme.max(nearest * response.peak * self.gain);
             }
-            let far = form.bounds().map_or(near, |bounds| distance_to_box(bounds, center));
             let farthest = radiance_at(far.max(radius).max(min_distance));
             dimmest = dimmest.min(farthest * response.least * self.faintest);
         }
@@ -398,6 +412,29 @@ impl<'a> SceneDistances<'a> {
             spots: or_typical(spots),
             extreme: or_typical(extreme),
         }
+    }
+
+    /// Returns the least distance above `min_clearance` between `center` and the surfaces of
+    /// `objects`, and the largest distance between the ball and one of them.
+    fn reach(
+        &self,
+        objects: &[usize],
+        (center, radius): &(DVec3, f64),
+        min_clearance: f64,
+    ) -> (f64, f64) {
+        let (mut nearest, mut farthest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for object in objects {
+            let bounds = self.boxes[*object];
+            // An object whose box is farther away than another object is not the nearest.
+            let mut clearance = bounds.map_or(0.0, |bounds| box_distance(bounds, *center));
+            if clearance <= nearest * (1.0 + 1e-9) {
+                clearance = self.forms[*object].clearance(*center).unwrap_or(0.0);
+                nearest = if clearance > min_clearance { nearest.min(clearance) } else { nearest };
+            }
+            let far = bounds.map_or(clearance - radius, |bounds| distance_to_box(bounds, *center));
+            farthest = farthest.max(far);
+        }
+        (nearest, farthest)
     }
 
     /// Returns `range` for a light with the radiance `emitted` that the camera and mirrors see.

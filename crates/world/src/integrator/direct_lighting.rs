@@ -2,6 +2,7 @@
 //! a size.
 
 use crate::culling::light_buffer::RayStart;
+use crate::integrator::clear_panes::Shadow;
 use crate::integrator::nested_dielectrics::attenuated;
 use crate::integrator::vertex::Vertex;
 use crate::lights::choice::LightChoice;
@@ -20,27 +21,32 @@ pub(crate) fn cosine_pdf<L: SimdFloat>(cos: L) -> L {
 impl<L: SimdFloat> Vertex<'_, L> {
     /// Adds an estimate of the light of one light sample to a light group (`SampleLd` of pbrt).
     /// `lit` are the lanes that the light reaches if nothing occludes it. `occluded` traces shadow
-    /// rays for the given lanes and returns the occluded lanes. `radiance` returns the radiance
+    /// rays for the given lanes. `radiance` returns the radiance
     /// that surfaces reflect or transmit.
     #[inline(always)]
     pub fn add_light(
         &mut self,
         group: usize,
         mut lit: L::Mask,
-        occluded: impl FnOnce(L::Mask) -> L::Mask,
+        shadow: impl FnOnce(&Self, L::Mask) -> Shadow<L>,
         radiance: impl FnOnce(&Self, L::Mask) -> Vec3<L>,
     ) {
         if lit.none() {
             return;
         }
+        let mut passed = None;
         if self.world.shadows {
             self.out.counts.add_rays(lit);
-            lit = lit.and_not(occluded(lit));
+            let shadow = shadow(self, lit);
+            (lit, passed) = (lit.and_not(shadow.occluded), shadow.passed);
             if lit.none() {
                 return;
             }
         }
-        let radiance = radiance(self, lit).masked(lit);
+        let mut radiance = radiance(self, lit).masked(lit);
+        if let Some(passed) = passed {
+            radiance = radiance * passed;
+        }
         self.out.groups[group] += radiance;
     }
 
@@ -115,21 +121,26 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 source.group,
                 lit,
                 #[inline(always)]
-                |lit| {
+                |vertex, lit| {
                     let (direction, t_max) = match &target.on_surface {
                         None => (light.wi, light.distance),
                         Some(on_surface) => on_surface.end(origin),
                     };
                     let ray = Ray { origin, direction };
                     if SIMPLE {
-                        world.geometry.occluded_linear(&ray, t_max, lit, occluders)
-                    } else if let Some(Some(buffer)) = world.culling.light_buffers.get(index) {
-                        let (primitive, outside) = (interaction.primitive, interaction.front);
-                        let start = RayStart { primitive, outside };
-                        buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
-                    } else {
-                        world.geometry.occluded(&ray, t_max, lit, occluders)
+                        let geometry = &world.geometry;
+                        let occluded = geometry.occluded_linear(&ray, t_max, lit, occluders);
+                        return Shadow { occluded, passed: None };
                     }
+                    let occluded =
+                        if let Some(Some(buffer)) = world.culling.light_buffers.get(index) {
+                            let (primitive, outside) = (interaction.primitive, interaction.front);
+                            let start = RayStart { primitive, outside };
+                            buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
+                        } else {
+                            world.geometry.occluded(&ray, t_max, lit, occluders)
+                        };
+                    vertex.shadow(occluded, &ray, t_max, vertex.media)
                 },
                 #[inline(always)]
                 |vertex, lit| {
@@ -161,14 +172,15 @@ impl<L: SimdFloat> Vertex<'_, L> {
             if let Some(factor) = cone {
                 lit = lit & factor.gt(L::zero());
             }
-            let occluded = |lit| {
+            let shadow = |vertex: &Self, lit| {
                 let ray = Ray { origin, direction: wi };
-                match SIMPLE {
+                let occluded = match SIMPLE {
                     true => world.geometry.occluded_linear(&ray, distance, lit, occluders),
                     false => world.geometry.occluded(&ray, distance, lit, occluders),
-                }
+                };
+                vertex.shadow(occluded, &ray, distance, vertex.media)
             };
-            self.add_light(choice.group, lit, occluded, |vertex, lit| {
+            self.add_light(choice.group, lit, shadow, |vertex, lit| {
                 let diffuse = cosine_pdf(interaction.normal.dot(wi));
                 let value = vertex.direct_value(wi, diffuse, lit);
                 let mut radiance = vertex.path.throughput.component_mul(value);

@@ -52,7 +52,7 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
         }
         let mut radiance = path.throughput * L::splat(light.radiance);
         if path.lobe_pdf.lt(L::from_f64(L::MAX)).any() {
-            let pdf = light.density(origin, t, L::from_id(0));
+            let pdf = path.light_density(light, t, L::from_id(0));
             radiance = radiance * power_heuristic(path.lobe_pdf, pdf);
         }
         radiance = attenuated(media, radiance, t);
@@ -109,7 +109,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             if let Some(light) = &source.light
                 && path.lobe_pdf.lt(L::from_f64(L::MAX)).any()
             {
-                let pdf = light.density(path.ray.origin, hit.t, hit.triangle);
+                let pdf = path.light_density(light, hit.t, hit.triangle);
                 radiance = radiance * power_heuristic(path.lobe_pdf, pdf);
             }
             self.out.groups[source.group] += source.emitted(radiance).masked(lanes);
@@ -139,12 +139,13 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let rays = source.visible.then_some(&glossy);
             let value = self.reflected(light, arrives, rays, |pdf| pdf);
             let lit = value.max_element().gt(L::zero());
-            let occluded = |lit| {
+            let shadow = |vertex: &Self, lit| {
                 let ray = Ray { origin, direction: light.wi };
-                let (emitters, geometry) = (&world.lights.emitters, &world.geometry);
-                emitters.occluded(index, geometry, &ray, light.distance, lit, occluders)
+                let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
+                let end = (&ray, light.distance);
+                vertex.emitter_shadow(index, end, (lit, occluded), vertex.media)
             };
-            self.add_light(source.group, lit, occluded, |vertex, _| {
+            self.add_light(source.group, lit, shadow, |vertex, _| {
                 source.emitted(vertex.unoccluded(value, light))
             });
         }

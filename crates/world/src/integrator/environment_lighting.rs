@@ -113,12 +113,13 @@ impl<L: SimdFloat> Vertex<'_, L> {
         value: Vec3<L>,
     ) {
         let (geometry, origin) = (&self.world.geometry, self.interaction.ray_origin());
-        let occluded = |lit| {
-            let ray = Ray { origin, direction: wi };
-            geometry.occluded(&ray, L::from_f64(L::MAX), lit, geometry.all())
+        let shadow = |vertex: &Self, lit| {
+            let (ray, t_max) = (Ray { origin, direction: wi }, L::from_f64(L::MAX));
+            let occluded = geometry.occluded(&ray, t_max, lit, geometry.all());
+            vertex.shadow(occluded, &ray, t_max, vertex.media)
         };
         let lit = value.max_element().gt(L::zero());
-        self.add_light(environment.group, lit, occluded, |vertex, _| {
+        self.add_light(environment.group, lit, shadow, |vertex, _| {
             environment.emitted(vertex.path.throughput.component_mul(value))
         });
     }

@@ -13,13 +13,13 @@
 
 use crate::integrator::Integrator;
 use crate::integrator::coincident_surfaces::CoincidentState;
-use crate::integrator::nested_dielectrics::MediumStack;
+use crate::integrator::nested_dielectrics::{MediumStack, equal};
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::integrator::vertex::Vertex;
 use crate::world::World;
 use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Frame, Mask, SimdFloat, Vec3};
+use zerkalo_kernel::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp::cosine_hemisphere;
 
 /// Density [1/sr] that multiple importance sampling assumes for rays of diffuse bounces: so small
@@ -39,7 +39,8 @@ pub(crate) struct DiffuseLimits {
 /// Reservoir of weighted reservoir sampling. It keeps one hit per lane, chosen from all hits of a
 /// generation, at which the next diffuse bounce starts.
 pub(crate) struct DiffuseReservoir<L: SimdFloat> {
-    offers: u32,
+    /// Number of hits that each lane has offered.
+    offers: L,
     /// Lanes whose reservoir holds a hit.
     lanes: L::Mask,
     /// Sum of the weights of all offered hits.
@@ -57,7 +58,7 @@ pub(crate) struct DiffuseReservoir<L: SimdFloat> {
 impl<L: SimdFloat> DiffuseReservoir<L> {
     fn new() -> Self {
         Self {
-            offers: 0,
+            offers: L::zero(),
             lanes: L::mask(false),
             sum: L::zero(),
             throughput: Vec3::zero(),
@@ -90,12 +91,17 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
             return lanes;
         }
         self.sum += weight.masked(lanes);
-        let mut taken = lanes;
-        if (self.lanes & lanes).any() {
-            let keeps = (vertex.sampler.reservoir_1d(self.offers) * self.sum).ge(weight);
-            taken = lanes.and_not(self.lanes & keeps);
+        // Random numbers are numbered by the offers of the lane, not of the packet, whose other lanes
+        // hit other surfaces.
+        let (mut taken, mut undecided) = (lanes, lanes & self.lanes);
+        while undecided.any() {
+            let offers = self.offers.lane(undecided.bits().trailing_zeros() as usize);
+            let alike = undecided & equal(self.offers, L::splat(offers));
+            let number = vertex.sampler.reservoir_1d(offers.to_f64() as u32);
+            taken = taken.and_not(alike & (number * self.sum).ge(weight));
+            undecided = undecided.and_not(alike);
         }
-        self.offers += 1;
+        self.offers += L::one().masked(lanes);
         self.lanes = self.lanes | lanes;
         self.throughput = Vec3::select(taken, throughput, self.throughput);
         self.origin = Vec3::select(taken, interaction.ray_origin(), self.origin);
@@ -122,6 +128,7 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
             ray: Ray { origin: self.origin, direction },
             throughput: Path::bounded(self.throughput * scale),
             lobe_pdf: L::from_f64(NO_PDF),
+            passed: L::zero(),
         };
         let lanes = self.lanes
             & direction.dot(self.geometric).gt(L::zero())

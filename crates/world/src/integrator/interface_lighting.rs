@@ -3,7 +3,7 @@
 //!
 //! Two strategies find this light. The first one samples a point of the emitter and traces a shadow
 //! ray to it. The second one samples the direction of the reflected or transmitted ray, which may
-//! hit the emitter. A shadow ray does not pass through glass: inside a solid, it ends at the far
+//! hit the emitter. A shadow ray does not pass through solids: inside one, it ends at the far
 //! side. Rays that enter a solid therefore use the second strategy only, with full weight. Both
 //! strategies are combined, with weights, in three cases: for reflected rays, for rays that leave a
 //! solid, and at thin surfaces.
@@ -144,15 +144,16 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let weight = power_heuristic(light.density, density);
         let value = value.component_mul(light.irradiance) * weight;
         let lit = side.lanes & arrives & value.max_element().gt(L::zero());
-        let occluded = |lit| {
+        let shadow = |vertex: &Self, lit| {
             let (ray, t_max) = (Ray { origin: side.origin, direction: light.wi }, light.distance);
-            let (emitters, geometry) = (&world.lights.emitters, &world.geometry);
+            let occluded = world.geometry.occluded(&ray, t_max, lit, world.geometry.all());
+            let media = Some(side.media);
             match emitter {
-                Some(i) => emitters.occluded(i, geometry, &ray, t_max, lit, geometry.all()),
-                None => geometry.occluded(&ray, t_max, lit, geometry.all()),
+                Some(i) => vertex.emitter_shadow(i, (&ray, t_max), (lit, occluded), media),
+                None => vertex.shadow(occluded, &ray, t_max, media),
             }
         };
-        self.add_light(source.group, lit, occluded, |vertex, _| {
+        self.add_light(source.group, lit, shadow, |vertex, _| {
             let radiance = vertex.path.throughput.component_mul(value);
             source.emitted(attenuated(Some(side.media), radiance, light.distance))
         });

@@ -2,6 +2,7 @@
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
+pub(crate) mod clear_panes;
 pub(crate) mod coincident_surfaces;
 mod direct_lighting;
 mod emitter_lighting;

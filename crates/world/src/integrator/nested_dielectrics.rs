@@ -89,8 +89,9 @@ impl<L: SimdFloat> MediumStack<L> {
     }
 }
 
+/// Returns the lanes in which `a` and `b` are equal.
 #[inline(always)]
-fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
+pub(crate) fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
     a.le(b) & b.le(a)
 }
 
@@ -99,6 +100,18 @@ fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
 pub(crate) struct Media<'a, L: SimdFloat> {
     pub nested_dielectrics: &'a NestedDielectrics<L>,
     pub stack: &'a MediumStack<L>,
+}
+
+impl<L: SimdFloat> Media<'_, L> {
+    /// Returns the lanes in which a solid of a higher priority hides the boundary of the transparent
+    /// solid that `primitive` bounds; none if it bounds no such solid.
+    #[inline(always)]
+    pub fn hidden(&self, primitive: u32) -> L::Mask {
+        match self.nested_dielectrics.priority_of[primitive as usize] {
+            0 => L::mask(false),
+            priority => self.stack.top().gt(L::from_f64(f64::from(priority))),
+        }
+    }
 }
 
 /// Returns `true` if the bounding box of `form` overlaps the sphere `ball` or is infinite.
@@ -115,6 +128,9 @@ pub(crate) struct NestedDielectrics<L: SimdFloat> {
     indices: Vec<L::Scalar>,
     /// Absorption coefficients [1 / scene unit], by priority. `None` if no solid absorbs light.
     absorption: Option<Vec<[L::Scalar; 3]>>,
+    /// `true` for each primitive that is a clear pane: thin, transparent and without roughness.
+    /// `None` if there are none.
+    pub clear_panes: Option<Vec<bool>>,
     /// Priorities and boundaries of the solids that may contain the origins of camera rays.
     around_eye: Vec<(u32, Aggregate<L>)>,
     /// Primitives that may touch a transmissive primitive; `None` if there are none.
@@ -179,6 +195,11 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let priority_of: Vec<u32> = priority_of.collect();
         let transparent: Vec<bool> =
             bsdf_of.iter().map(|bsdf| transmission_of(*bsdf).is_some()).collect();
+        let is_clear = |(bsdf, priority): (&u32, &u32)| {
+            *priority == 0 && transmission_of(*bsdf).is_some() && bsdfs[*bsdf as usize].is_delta()
+        };
+        let clear_panes: Vec<bool> = bsdf_of.iter().zip(&priority_of).map(is_clear).collect();
+        let clear_panes = clear_panes.contains(&true).then_some(clear_panes);
         let input_error = geometry.input_error();
         let contacts =
             Contacts::new(forms, primitives, &transparent, &priority_of, L::EPSILON, input_error);
@@ -197,7 +218,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let absorption: Vec<_> = solids.iter().map(absorption_of).collect();
         let absorbs = absorption.iter().flatten().any(|c| c.to_f64() > 0.0);
         let absorption = absorbs.then_some(absorption);
-        Some(Self { priority_of, indices, absorption, around_eye, contacts })
+        Some(Self { priority_of, indices, absorption, clear_panes, around_eye, contacts })
     }
 
     /// Returns `true` if `primitive` bounds a solid that paths can be inside of.

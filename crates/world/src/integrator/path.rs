@@ -3,6 +3,7 @@
 use crate::lights::groups::MAX_GROUPS;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
+use zerkalo_scene::light::Emitter;
 
 /// Radiance of a packet's samples in each light group. A light with a group of its own counts as a
 /// white light of intensity 1.
@@ -48,6 +49,8 @@ pub struct Path<L> {
     /// Density [1/sr] with which the ray was sampled; the largest finite number for camera rays,
     /// mirrors and refraction. It is used only in worlds with emitters.
     pub lobe_pdf: L,
+    /// Distance that the ray has travelled through clear panes since it was sampled.
+    pub passed: L,
 }
 
 impl<L: SimdFloat> Path<L> {
@@ -58,7 +61,12 @@ impl<L: SimdFloat> Path<L> {
     /// Creates the paths of the camera rays `ray`, with throughput 1.
     #[inline(always)]
     pub fn new(ray: Ray<L>) -> Self {
-        Self { ray, throughput: Vec3::of([1.0; 3]), lobe_pdf: L::from_f64(L::MAX) }
+        Self {
+            ray,
+            throughput: Vec3::of([1.0; 3]),
+            lobe_pdf: L::from_f64(L::MAX),
+            passed: L::zero(),
+        }
     }
 
     /// Returns `yes` in the lanes of `mask` and `no` elsewhere.
@@ -71,7 +79,17 @@ impl<L: SimdFloat> Path<L> {
             },
             throughput: Vec3::select(mask, yes.throughput, no.throughput),
             lobe_pdf: L::select(mask, yes.lobe_pdf, no.lobe_pdf),
+            passed: L::select(mask, yes.passed, no.passed),
         }
+    }
+
+    /// Returns the density [1/sr] with which a point of `light` is sampled that the ray hits at
+    /// distance `t`, on `triangle` of a mesh. Points are sampled from the origin of the ray before
+    /// all clear panes.
+    #[inline(always)]
+    pub(crate) fn light_density(&self, light: &Emitter<L::Scalar>, t: L, triangle: L) -> L {
+        let Ray { origin, direction } = self.ray;
+        light.density(direction.mul_add(-self.passed, origin), t + self.passed, triangle)
     }
 
     /// Returns `throughput`, limited to 2^60 in each channel. Mirrors that amplify light would let

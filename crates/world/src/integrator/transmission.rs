@@ -357,6 +357,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             ray: Ray { origin, direction },
             throughput: Vec3::zero(),
             lobe_pdf: L::from_f64(L::MAX),
+            passed: L::zero(),
         };
         let straight = hit.media.thin | hit.suppressed;
         let refracted = Vec3::select(straight, incident, interface.refracted);
@@ -419,6 +420,9 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             share = shares.reflected.masked(!hit.suppressed);
             let transmitted = L::select(hit.suppressed, L::one(), shares.transmitted);
             let transmitted = throughput * transmitted;
+            if world.lights.has_emitters() && (lanes & hit.media.thin).any() {
+                self.pass_pane(vertex, lanes & hit.media.thin);
+            }
             let tir = throughput * shares.tir.masked(!hit.suppressed);
             self.transmitted.throughput =
                 Vec3::select(lanes, transmitted, self.transmitted.throughput);
@@ -443,6 +447,17 @@ impl<'a, L: SimdFloat> Split<'a, L> {
         let ray = &mut self.reflected.ray;
         ray.direction = Vec3::select(lanes, sample.direction, ray.direction);
         self.reflected.throughput = Vec3::select(lanes, throughput, self.reflected.throughput);
+    }
+
+    /// Lets the transmitted rays of `lanes`, which pass clear panes, keep the density of the paths:
+    /// shadow rays pass the panes, too.
+    #[inline(never)]
+    fn pass_pane(&mut self, vertex: &Vertex<'_, L>, lanes: L::Mask) {
+        let (path, transmitted) = (&*vertex.path, &mut self.transmitted);
+        let step = (transmitted.ray.origin - path.ray.origin).dot(path.ray.direction);
+        let passed = (path.passed + step).masked(path.lobe_pdf.lt(L::from_f64(L::MAX)));
+        transmitted.lobe_pdf = L::select(lanes, path.lobe_pdf, transmitted.lobe_pdf);
+        transmitted.passed = L::select(lanes, passed, transmitted.passed);
     }
 
     /// Samples the directions of `lanes`, whose surfaces have BSDF number `index` and transmit with

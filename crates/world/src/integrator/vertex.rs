@@ -102,6 +102,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             path.throughput = Vec3::select(lanes, throughput, path.throughput);
         }
         self.path.ray.origin = interaction.ray_origin();
+        self.path.passed = L::zero();
         interaction.reflecting & world.reaches_min_throughput(self.path.throughput)
     }
 

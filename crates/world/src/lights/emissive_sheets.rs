@@ -14,6 +14,7 @@ use crate::compile::RecenteredGeometry;
 use crate::integrator::coincident_surfaces::touching_pairs;
 use crate::lights::emissive_forms::{triangles_of_mesh, triangles_of_polyhedron};
 use crate::lights::emitters::CONTACT_LIFTS;
+use crate::lights::on_surfaces::WRITTEN;
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use zerkalo_kernel::primitive::{BoundingSphere, Form, HalfSpace};
@@ -61,7 +62,8 @@ pub(crate) fn move_off_surfaces(
     if sheets.iter().all(Option::is_none) {
         return None;
     }
-    let reach = CONTACT_LIFTS * lift;
+    let written = WRITTEN * geometry.extent;
+    let reach = (CONTACT_LIFTS * lift).max(written);
     let may_lie_on = |object: usize, carrier: usize| {
         let sheet = sheets[object].as_ref().filter(|_| emits[carrier] == Emits::Nothing);
         sheet.is_some_and(|sheet| may_carry(&forms[carrier], sheet, reach))
@@ -92,7 +94,11 @@ pub(crate) fn move_off_surfaces(
         } else {
             -1.0
         };
-        let shift = |contact: &Contact| GAP_LIFTS * lift - side * contact.height;
+        let shift = |contact: &Contact| {
+            let is_exact = contact.height.abs() <= CONTACT_LIFTS * lift;
+            let gap = if is_exact { GAP_LIFTS * lift } else { 2.0 * written };
+            gap - side * contact.height
+        };
         let shift = contacts.iter().map(shift).fold(0.0, f64::max);
         let by = DAffine3::from_translation(plane.normal * (side * shift));
         moved.get_or_insert_with(|| forms.to_vec())[object] =

@@ -17,8 +17,8 @@ use crate::lights::groups::{GroupedSource, LightGroupSource, LightGroups};
 use crate::world::LightSource;
 use std::collections::{HashMap, HashSet};
 use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, distinct};
-use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId, PrimitiveSet};
+use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3, distinct};
+use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId};
 use zerkalo_scene::Scene;
 use zerkalo_scene::light::{Emitter, LightSample};
 use zerkalo_scene::material::Material;
@@ -44,6 +44,8 @@ pub(crate) struct Emitters<S> {
     source_of: Vec<Option<u32>>,
     /// For each sampled object, the objects that touch it.
     touching: Vec<Vec<TouchingObject>>,
+    /// For each sampled object, its primitive.
+    primitives: Vec<u32>,
     /// Height above the surface of an emissive object at which its points are sampled.
     lift: S,
 }
@@ -102,6 +104,8 @@ impl<S: Float> Emitters<S> {
         let (mut compiled, unsampled): (Vec<_>, Vec<_>) =
             distinct.map(compile).partition(|(_, source)| source.light.is_some());
         let touching = objects.touching(compiled.iter().map(|((object, _), _)| *object));
+        let primitive_of: HashMap<_, u32> = parts.iter().zip(0..).collect();
+        let primitives = compiled.iter().map(|(part, _)| primitive_of[&Some(*part)]).collect();
         let (lights_len, sampled) = (lights.len(), lights.len() + compiled.len());
         compiled.extend(unsampled);
         let indices: HashMap<_, u32> =
@@ -109,7 +113,8 @@ impl<S: Float> Emitters<S> {
         let source_of = parts.iter().map(|part| indices.get(&(*part)?).copied()).collect();
         let mut sources = lights;
         sources.extend(compiled.into_iter().map(|(_, source)| source));
-        Self { sources, lights: lights_len, sampled, source_of, touching, lift: S::from_f64(lift) }
+        let lift = S::from_f64(lift);
+        Self { sources, lights: lights_len, sampled, source_of, touching, primitives, lift }
     }
 
     /// Samples a point of the emitter with the number `index` for each of the receivers at
@@ -125,27 +130,30 @@ impl<S: Float> Emitters<S> {
         Some(source.with_light(source.light.as_ref()?.sample(origin, numbers)))
     }
 
-    /// Returns the lanes of `wanted` whose shadow ray does not reach its end point, which was
-    /// sampled on emitter number `index`, at `distance`: one of `occluders` is in between, or the
-    /// point is just inside an object that touches the emitter.
+    /// Returns the lanes of `lanes` whose point at `distance` along `ray`, which was sampled on
+    /// emitter number `index`, is just inside an object that touches the emitter.
     #[inline(always)]
-    pub fn occluded<L: SimdFloat<Scalar = S>>(
+    pub fn covered<L: SimdFloat<Scalar = S>>(
         &self,
         index: usize,
         geometry: &Aggregate<L>,
         ray: &Ray<L>,
         distance: L,
-        wanted: L::Mask,
-        occluders: &PrimitiveSet,
+        lanes: L::Mask,
     ) -> L::Mask {
-        let occluded = geometry.occluded(ray, distance, wanted, occluders);
         match index.checked_sub(self.lights).and_then(|object| self.touching.get(object)) {
             Some(touching) if !touching.is_empty() => {
-                let lanes = wanted.and_not(occluded);
-                occluded | self.covered_by(touching, geometry, ray, distance, lanes)
+                self.covered_by(touching, geometry, ray, distance, lanes)
             }
-            Some(_) | None => occluded,
+            Some(_) | None => L::mask(false),
         }
+    }
+
+    /// Returns the primitive on which points of emitter number `index` are sampled; `None` for a
+    /// light.
+    #[inline(always)]
+    pub fn primitive(&self, index: usize) -> Option<u32> {
+        self.primitives.get(index.checked_sub(self.lights)?).copied()
     }
 
     /// Returns the lanes of `lanes` whose point, at `distance` along `ray`, is just inside one of

@@ -15,6 +15,10 @@ use zerkalo_kernel::primitive::Form;
 /// largest coordinate.
 const ON: f64 = 8.0;
 
+/// Rounding error of coordinates that people write, as a fraction of the largest coordinate. A light
+/// that is on a surface but for this error counts as on it in either precision.
+pub(crate) const WRITTEN: f64 = 1e-7;
+
 /// Height above a light's surface at which shadow rays to the light end, in rounding errors of the
 /// largest coordinate.
 const LIFT: f64 = 16.0;
@@ -43,8 +47,13 @@ impl<S: Float> OnSurface<S> {
         let given = f64::EPSILON * origin.abs().max_element();
         for form in forms {
             let reach = form.max_coordinate();
-            let rounding = (epsilon * reach.max(position.abs().max_element())).max(given);
-            let normals = form.normals_at(position, ON * rounding);
+            let size = reach.max(position.abs().max_element());
+            let mut rounding = (epsilon * size).max(given);
+            let mut normals = form.normals_at(position, ON * rounding);
+            if normals.is_empty() && ON * rounding < WRITTEN * size {
+                rounding = WRITTEN * size / ON;
+                normals = form.normals_at(position, ON * rounding);
+            }
             if !normals.is_empty() {
                 largest = largest.max(rounding);
             }

@@ -39,11 +39,12 @@ pub struct CsgSolid {
     pub parts: Vec<Solid>,
     /// Tree of set operations, in which every part occurs once, in the order of `parts`.
     pub tree: CsgTree,
+    bounds: Option<Bounds>,
 }
 
 impl CanonicalShape for CsgSolid {
     fn bounds(&self) -> Option<Bounds> {
-        self.bounds_of(&self.tree)
+        self.bounds
     }
 
     fn thickness(&self) -> f64 {
@@ -67,11 +68,19 @@ impl CsgSolid {
     /// Combines `parts` by `tree`; `None` if a part is not a solid.
     pub fn new(parts: impl IntoIterator<Item = Form>, tree: CsgTree) -> Option<Self> {
         let parts = parts.into_iter().map(Form::into_solid).collect::<Option<_>>()?;
-        Some(Self { parts, tree })
+        Some(Self::of_solids(parts, tree))
+    }
+
+    /// Combines `parts` by `tree`.
+    pub fn of_solids(parts: Vec<Solid>, tree: CsgTree) -> Self {
+        let mut out = Self { parts, tree, bounds: None };
+        out.bounds = out.bounds_of(&out.tree);
+        out
     }
 
     pub(in crate::primitive) fn transformed(self, map: &DAffine3) -> Self {
-        Self { parts: self.parts.into_iter().map(|p| p.transformed(map)).collect(), ..self }
+        let parts = self.parts.into_iter().map(|p| p.transformed(map)).collect();
+        Self::of_solids(parts, self.tree)
     }
 
     /// Returns `true` if the bounding boxes of the parts show that the solid has no points, for

@@ -3,6 +3,7 @@
 
 use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
 use crate::primitive::canonical::Bounds;
+use crate::primitive::mesh::instance::EXTENT_PER_DETAIL;
 use crate::primitive::mesh::normals::creased;
 use crate::primitive::mesh::{CornerNormals, TriangleMesh};
 use glam::DVec3;
@@ -28,9 +29,17 @@ pub struct Mesh {
     pub leaves: Vec<TriangleBlock>,
     /// Index of the first triangle of each leaf.
     pub firsts: Vec<u32>,
+    /// `true` if some triangle is long and thin, so that rays need the more exact test.
+    pub thin: bool,
+    /// Largest ratio of length to height of the triangles that are not small in the mesh.
+    pub aspect: f64,
     /// Computed normals by crease angle \[degrees\].
     creased: Mutex<Vec<(f64, Arc<CornerNormals>)>>,
 }
+
+/// Largest ratio of a triangle's length to its height at which the rounding errors of the simple test
+/// are within the ray offset.
+const MAX_ASPECT: f64 = 64.0;
 
 /// Two meshes are equal only if they are the same allocation.
 impl PartialEq for Mesh {
@@ -81,7 +90,19 @@ impl Mesh {
         let firsts = leaves.iter().map(|(first, _)| *first).collect();
         let leaves =
             leaves.iter().map(|(first, count)| TriangleBlock::new(&mesh, *first, *count)).collect();
-        Self { mesh, boxes, leaves, firsts, creased: Mutex::default() }
+        let size = (0..3).map(|k| mesh.bounds[1][k] - mesh.bounds[0][k]).fold(0.0, f32::max);
+        let (mut thin, mut aspect) = (false, 0.0f64);
+        for triangle in &mesh.triangles {
+            let [a, b, c] =
+                triangle.map(|v| DVec3::from(mesh.positions[v as usize].map(f64::from)));
+            let longest = [b - a, c - b, a - c].into_iter().map(DVec3::length).fold(0.0, f64::max);
+            let own = longest * longest / (b - a).cross(c - a).length();
+            thin |= own > MAX_ASPECT;
+            if longest * EXTENT_PER_DETAIL >= f64::from(size) {
+                aspect = aspect.max(own);
+            }
+        }
+        Self { mesh, boxes, leaves, firsts, thin, aspect, creased: Mutex::default() }
     }
 
     /// Returns normals that are smooth except at creases above an angle, which the first call

@@ -17,7 +17,10 @@ use std::sync::Arc;
 
 /// Assumed ratio of a mesh's extent to the size of its smallest details, for the choice of single
 /// or double precision.
-const EXTENT_PER_DETAIL: f64 = 64.0;
+pub(super) const EXTENT_PER_DETAIL: f64 = 64.0;
+
+/// Largest ratio of a triangle's length to its height for which single precision suffices.
+const MAX_SINGLE_ASPECT: f64 = 1e4;
 
 /// Shading normals of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,7 +73,8 @@ impl CanonicalShape for MeshForm {
         // A needle or a thin sheet is as thick as the shortest side of its bounding box. Sides of
         // length 0 are left out, because a flat mesh encloses no volume.
         let thinnest = size.into_iter().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
-        thinnest.min(longest / EXTENT_PER_DETAIL)
+        let aspect = Some(self.mesh.aspect).filter(|aspect| *aspect > MAX_SINGLE_ASPECT);
+        thinnest.min(longest / aspect.unwrap_or(EXTENT_PER_DETAIL))
     }
 
     fn clearance(&self, point: DVec3) -> Option<f64> {
@@ -256,6 +260,13 @@ impl<L: SimdFloat> Triangle<L> {
         (b - a).cross(c - a)
     }
 
+    /// Returns [`Self::normal`], more exactly.
+    #[inline(always)]
+    fn exact_normal(&self) -> Vec3<L> {
+        let [a, b, c] = self.corners;
+        (b - a).exact_cross(c - a)
+    }
+
     /// Returns the gradients of the barycentric weights of the second and of the third corner.
     #[inline(always)]
     fn gradients(&self) -> [Vec3<L>; 2] {
@@ -317,7 +328,7 @@ impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
     fn surface(&self, triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
         let triangle = self.triangle(triangle);
         // The normal is scaled so that its squared length neither overflows nor vanishes.
-        let flat = triangle.normal();
+        let flat = if self.mesh.thin { triangle.exact_normal() } else { triangle.normal() };
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());
         let flat = Vec3::select(sound, flat * (L::one() / largest), Vec3::of([0.0, 0.0, 1.0]));

@@ -83,8 +83,35 @@ impl<L: SimdFloat> ShearedRay<L> {
     /// exact sign, or as 0. Hence no ray passes between two triangles that share an edge or a
     /// corner (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an
     /// orthonormal frame for the shear).
+    ///
+    /// In a [`thin`](Mesh::thin) mesh `t` comes from the triangle's plane, because the areas at the
+    /// edges have an error of their length squared.
     #[inline(always)]
-    fn intersect(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
+    fn intersect(&self, corners: [Vec3<L>; 3], thin: bool) -> (L, L::Mask) {
+        if thin {
+            return self.intersect_thin(corners);
+        }
+        let (p, [u, v, w], inside) = self.project(corners);
+        // The t of an edge-on triangle, without area, is 0 / 0, which counts as no hit.
+        let t = (u * p[0].z + v * p[1].z + w * p[2].z) / (u + v + w);
+        (t, inside & t.gt(L::zero()))
+    }
+
+    #[inline(never)]
+    fn intersect_thin(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
+        let (p, _, inside) = self.project(corners);
+        if inside.none() {
+            return (L::zero(), inside);
+        }
+        let normal = (p[1] - p[0]).exact_cross(p[2] - p[0]);
+        let t = normal.dot(p[0]) / normal.z;
+        (t, inside & t.gt(L::zero()))
+    }
+
+    /// Returns the corners in the frames of the rays, the areas that the edges span with the origin,
+    /// and the lanes whose line meets the triangle.
+    #[inline(always)]
+    fn project(&self, corners: [Vec3<L>; 3]) -> ([Vec3<L>; 3], [L; 3], L::Mask) {
         let p = corners.map(|c| self.frame.to_local(c - self.origin));
         // The products are rounded separately, without fused multiply-add, so that the difference
         // never has the wrong sign.
@@ -93,9 +120,7 @@ impl<L: SimdFloat> ShearedRay<L> {
         let zero = L::zero();
         let left = u.ge(zero) & v.ge(zero) & w.ge(zero);
         let right = u.le(zero) & v.le(zero) & w.le(zero);
-        // The t of an edge-on triangle, without area, is 0 / 0, which counts as no hit.
-        let t = (u * p[0].z + v * p[1].z + w * p[2].z) / (u + v + w);
-        (t, (left | right) & t.gt(zero))
+        (p, [u, v, w], left | right)
     }
 
     /// Returns the corners of consecutive triangles of a leaf, one triangle per lane. The first one
@@ -130,7 +155,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             return found;
         }
         let bounds = PacketBounds::around(packet, wanted);
-        let boxes = &self.mesh.boxes;
+        let (boxes, thin) = (&self.mesh.boxes, self.mesh.thin);
         let leaf = |number: usize, _| {
             let leaf = &self.mesh.leaves[number];
             let first = self.mesh.firsts[number];
@@ -154,7 +179,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                         Vec3::new(broadcast(c[0][i]), broadcast(c[1][i]), broadcast(c[2][i]))
                     };
                     let (t, hit_mask) =
-                        sheared_ray.intersect(leaf.corners.each_ref().map(broadcast_corner));
+                        sheared_ray.intersect(leaf.corners.each_ref().map(broadcast_corner), thin);
                     let tie = hit_mask & t.le(found.t);
                     if tie.none() {
                         continue;
@@ -202,12 +227,13 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         for (lane, found) in found.iter_mut().enumerate().take(L::WIDTH) {
             *found = (limit.lane(lane), 0);
         }
+        let thin = self.mesh.thin;
         let leaf = |lane: usize, number: usize, limit: L::Scalar| {
             let leaf = &self.mesh.leaves[number];
             let sheared_ray = ShearedRay::<L>::only(&rays[lane]);
             let (best, triangle) = &mut found[lane];
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
-                let (t, hit_mask) = sheared_ray.intersect(ShearedRay::corners(leaf, part));
+                let (t, hit_mask) = sheared_ray.intersect(ShearedRay::corners(leaf, part), thin);
                 let mut bits = (hit_mask & t.le(L::splat(*best))).bits() & valid_lanes();
                 while bits != 0 {
                     let lane = bits.trailing_zeros();
