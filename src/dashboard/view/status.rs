@@ -168,16 +168,15 @@ pub fn hints_line(model: &Model, area: Rect, painter: &mut Painter) {
         row.put(mark, style).put(&notice.text, theme.text());
         return;
     }
-    if let Some(Snapshot { report: Report { state: State::Finished(_), .. }, .. }) =
-        model.snapshot.as_deref()
-        && model.overlay.is_none()
-        && row.left() > 100
-    {
-        row.put_right(&model.graphics.description(), 40, theme.dim());
-    }
     for hint in fitting(hints(model), row.left()) {
         row.put(hint.keys, theme.accent().add_modifier(Modifier::BOLD)).put(" ", theme.dim());
         row.put(hint.text, theme.dim()).skip(3);
+    }
+    if let Some(Snapshot { report: Report { state: State::Finished(_), .. }, .. }) =
+        model.snapshot.as_deref()
+        && model.overlay.is_none()
+    {
+        row.put_right(&model.graphics.description(), 2, theme.dim());
     }
 }
 
