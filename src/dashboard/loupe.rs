@@ -131,7 +131,7 @@ impl Model {
     fn noisiest(&self, snapshot: &Snapshot, is_new: bool) -> Option<[usize; 2]> {
         let (hits, picture) = (snapshot.first_hits.as_deref()?, snapshot.picture.as_ref()?);
         let [columns, rows] = [hits.columns, hits.rows];
-        if [picture.cols, picture.rows] != [columns, rows] || hits.texels.is_empty() {
+        if [picture.cols, picture.rows] != [columns, rows] {
             return None;
         }
         let mut counts = BTreeMap::new();
@@ -139,48 +139,29 @@ impl Model {
         mirrors.for_each(|hit| *counts.entry(hit.object).or_insert(0) += 1);
         let largest = counts.into_iter().max_by_key(|(_, count)| *count).map(|(object, _)| object);
         let is_mirror = |i: usize| largest.is_none_or(|object| hits.texels[i].object == object);
-        let to_8 = self.display.to_8();
-        let radiance = picture.mixed(&snapshot.weights);
+        let (to_8, radiance) = (self.display.to_8(), picture.mixed(&snapshot.weights));
         let levels: Vec<_> = radiance.iter().map(|c| to_8(c.map(f64::from))[1]).collect();
-        let Window { origin, size } = hits.window;
-        let pixel = |i: usize| {
-            [
-                origin[0] + (2 * (i % columns) + 1) * size[0] / (2 * columns),
-                origin[1] + (2 * (i / columns) + 1) * size[1] / (2 * rows),
-            ]
-        };
-        let tiles = &snapshot.tiles;
-        let score = |i: usize| {
-            let [x, y] = pixel(i).map(|n| n / TILE);
-            if let Some(noise) = tiles.noise_levels.get(y * tiles.columns + x) {
-                return f64::from(*noise).powi(2);
-            }
-            let inside = |n: usize| n < levels.len() && is_mirror(n);
+        let (tiles, size) = (&snapshot.tiles, LARGEST.map(usize::from));
+        let window_of = |[x, y]: [usize; 2]| [x / size[0], y / (2 * size[1])];
+        let mut windows: BTreeMap<[usize; 2], f64> = BTreeMap::new();
+        for i in (0..levels.len()).filter(|i| is_mirror(*i)) {
+            let pixel = [(0, i % columns, columns), (1, i / columns, rows)];
+            let pixel = pixel.map(|(axis, at, cells)| hits.window.pixel(axis, at, cells));
+            let [x, y] = pixel.map(|n| n / TILE);
+            let beside = [i + 1, i + columns].into_iter();
+            let beside = beside.filter(|n| *n < levels.len() && is_mirror(*n));
             let step = |n: usize| f64::from(levels[i].abs_diff(levels[n])).min(MOST_CONTRAST);
-            [i + 1, i + columns].into_iter().filter(|n| inside(*n)).map(step).sum()
+            *windows.entry(window_of(pixel)).or_default() +=
+                match tiles.noise_levels.get(y * tiles.columns + x) {
+                    Some(noise) => f64::from(*noise).powi(2),
+                    None => beside.map(step).sum(),
+                };
+        }
+        let (best, most) = windows.iter().max_by(|a, b| a.1.total_cmp(b.1))?;
+        let is_kept = |target: &[usize; 2]| {
+            !is_new && windows.get(&window_of(*target)).is_some_and(|now| 2.0 * now >= *most)
         };
-        let scores: Vec<_> =
-            (0..levels.len()).map(|i| if is_mirror(i) { score(i) } else { 0.0 }).collect();
-        let reach = [(0, columns), (1, rows)].map(|(i, cells)| {
-            let pixels = usize::from(LARGEST[i]) * (i + 1);
-            pixels * cells / size[i].max(1) / 2
-        });
-        let sum = |i: usize| {
-            let (x, y) = (i % columns, i / columns);
-            let across = x.saturating_sub(reach[0])..(x + reach[0] + 1).min(columns);
-            let down = y.saturating_sub(reach[1])..(y + reach[1] + 1).min(rows);
-            let row = |y: usize| scores[y * columns..][across.clone()].iter().sum::<f64>();
-            down.map(row).sum::<f64>()
-        };
-        let mirrors = (0..levels.len()).filter(|i| is_mirror(*i)).map(|i| (i, sum(i)));
-        let (best, most) = mirrors.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
-        let now = self.loupe.target.filter(|_| !is_new).and_then(|target| {
-            let cell = |i: usize, cells: usize| {
-                (target[i].max(origin[i]) - origin[i]) * cells / size[i].max(1)
-            };
-            let i = cell(1, rows).min(rows - 1) * columns + cell(0, columns).min(columns - 1);
-            (2.0 * sum(i) >= most).then_some(target)
-        });
-        Some(now.unwrap_or(pixel(best)))
+        let middle = [best[0] * size[0] + size[0] / 2, best[1] * 2 * size[1] + size[1]];
+        Some(self.loupe.target.filter(is_kept).unwrap_or(middle))
     }
 }

@@ -305,7 +305,7 @@ fn scenes_and_meshes_that_do_not_fit_are_refused() {
 fn images_that_do_not_fit_together_are_refused() {
     let desk = Desk::new();
     let pixels = vec![200; 3 * 3000 * 3000];
-    let png = zerkalo_render::image_file::png_of_rgb([3000, 3000], &pixels).unwrap();
+    let png = zerkalo_render::image_file::png_of_rgb([3000, 3000], &pixels, None).unwrap();
     let mut textures = SCENE.to_string();
     for i in 0..40 {
         fs::write(desk.path(&format!("{i}.png")), &png).unwrap();

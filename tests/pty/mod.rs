@@ -6,6 +6,7 @@ mod editing;
 mod hostile;
 mod life;
 mod limits;
+mod panel;
 mod picture;
 mod stills;
 mod stopping;

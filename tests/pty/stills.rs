@@ -12,8 +12,10 @@ use terminal::RequestReply;
 use zerkalo_terminal::LEAVE;
 
 const SIZE: [u16; 2] = [120, 36];
-const CELL: RequestReply = (b"\x1b[16t", "\x1b[6;20;10t");
-const KITTY: RequestReply = (b"\x1b_Gi=31,", "\x1b_Gi=31;OK\x1b\\");
+/// Width and height in [`CELL`].
+pub const CELL_PX: [usize; 2] = [10, 20];
+pub const CELL: RequestReply = (b"\x1b[16t", "\x1b[6;20;10t");
+pub const KITTY: RequestReply = (b"\x1b_Gi=31,", "\x1b_Gi=31;OK\x1b\\");
 const SIXEL: RequestReply = (b"\x1b[c", "\x1b[?62;4;22c");
 const COLORS: RequestReply = (b"\x1b[?1;1;0S", "\x1b[?1;0;256S");
 /// Bytes that remove an image from the screen in kitty's graphics protocol.

@@ -1,7 +1,8 @@
 //! Stories of the zoomed picture and of the loupe.
 
 use super::*;
-use zerkalo_render::film::Window;
+use zerkalo_render::film::{Detail, Window};
+use zerkalo_render::session::View;
 
 /// Returns the dashboard on the room with a film of 640 x 480 pixels.
 fn large() -> Desk {
@@ -35,7 +36,9 @@ fn zoom_shows_a_window_of_the_film() {
     assert_eq!(moved, [320 - size[0] / 2 - 4, 240 - size[1] / 2 + 4]);
     desk.keys("Left Up");
     assert!(window(&desk).origin[0] < moved[0] && window(&desk).origin[1] < moved[1]);
-    (0..40).for_each(|_| drop(desk.keys("Right Down")));
+    (0..90).for_each(|_| {
+        desk.keys("Right Down");
+    });
     assert_eq!(window(&desk).origin, [640 - size[0], 480 - size[1]], "as far as the film reaches");
     // The window follows the probe.
     desk.keys("i");
@@ -71,8 +74,11 @@ fn rendered(spp: u32) -> Desk {
     desk.keys("G");
     let mut session = new_session(2, 1, spp_stop(spp), false);
     session.set_scene(Arc::clone(desk.model.scene()));
-    for _ in 0..400 {
-        session.set_view(desk.model.requested);
+    let mut view = View::default();
+    for _ in 0..4000 {
+        if std::mem::replace(&mut view, desk.model.requested) != desk.model.requested {
+            session.set_view(desk.model.requested);
+        }
         let snapshot = session.wait(Duration::from_secs(60)).expect("a snapshot in time");
         let finished = matches!(snapshot.report.state, State::Finished(_));
         let window = snapshot.detail.as_ref().map(|detail| detail.window);
@@ -95,7 +101,7 @@ fn loupe_shows_the_grain_of_the_mirror() {
         assert!(hits.at_pixel(target).unwrap().reflects, "{target:?}");
         desk.model.loupe.detail.clone().unwrap()
     });
-    let rms = |detail: &zerkalo_render::film::Detail| {
+    let rms = |detail: &Detail| {
         let pairs = detail.pixels.as_flattened().iter().zip(last.pixels.as_flattened());
         let sum: f64 = pairs.map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum();
         (sum / (3 * last.pixels.len()) as f64).sqrt()

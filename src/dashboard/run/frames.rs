@@ -13,6 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use zerkalo_terminal::diff::{Frame, FrameDiff, TargetFrame};
 use zerkalo_terminal::flow::{FlowControl, FrameBudget, InitialLink, TcpSendQueue};
+use zerkalo_terminal::image::TileImage;
 use zerkalo_terminal::{Capabilities, Multiplexer, Tty, copied, hyperlink};
 
 /// Start and end of a synchronised update, which the terminal displays as a whole.
@@ -323,8 +324,8 @@ impl FramePipeline {
             let complete = self.tiles.next(room - before, &mut bytes);
             self.diff.moved();
             if let Some(cells) = complete {
-                if self.tiles.is_sixel() {
-                    self.diff.overwritten(cells, &PanelTiles::pixel_cell());
+                if self.tiles.replace_cells() {
+                    self.diff.overwritten(cells, &TileImage::pixels());
                 }
                 let View { place, uncovered, .. } = &mut self.view;
                 self.tiles.paint(&mut self.target, *place, uncovered);

@@ -3,7 +3,7 @@
 
 use crate::dashboard::layout::PixelGrid;
 use crate::dashboard::{DisplayChannel, Model, Overlay};
-use ratatui::buffer::{Buffer, Cell};
+use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::style::Color;
 use std::sync::Arc;
@@ -28,6 +28,8 @@ struct Tile {
     shown: Vec<[u8; 3]>,
     /// `true` if text covers a part of it.
     covered: bool,
+    /// Cells with marks on the picture, at which an image above the text is transparent.
+    holes: Vec<Position>,
 }
 
 /// Transfer of a tile, and the number of bytes sent.
@@ -47,6 +49,8 @@ pub struct PanelTiles {
     tiles: Vec<Tile>,
     /// Picture whose differences determine `order`.
     detail: Option<Arc<Detail>>,
+    /// RMS difference in levels up to which a tile is not sent again.
+    least: f64,
     /// Tiles to send, the last one first.
     order: Vec<usize>,
     sending: Option<Sending>,
@@ -69,22 +73,25 @@ impl PanelTiles {
         let mut changed = !self.detail.as_ref().is_some_and(|old| Arc::ptr_eq(old, &detail));
         self.detail = Some(detail);
         for (i, tile) in self.tiles.iter_mut().enumerate() {
-            let covered = is_covered(tile.image.place, target, picture);
-            changed |= std::mem::replace(&mut tile.covered, covered) != covered;
-            if !covered {
+            let (covered, holes) = covering(&tile.image, target, picture);
+            let is_kept = !covered && holes == tile.holes;
+            changed |= tile.covered != covered || holes != tile.holes;
+            (tile.covered, tile.holes) = (covered, holes);
+            if is_kept {
                 continue;
             }
             if self.sending.take_if(|sending| sending.tile == i).is_some() {
-                removal += &tile.image.give_up();
+                removal += &TileImage::give_up(tile.image.protocol);
             }
             if !std::mem::take(&mut tile.shown).is_empty() {
                 removal += &tile.image.removal();
             }
         }
-        if changed {
-            let snapshot = model.snapshot.as_ref();
-            let is_tracing = snapshot.is_some_and(|s| matches!(s.report.state, State::Tracing));
-            self.sort(if is_tracing { VISIBLE_LEVELS } else { 0.0 });
+        let snapshot = model.snapshot.as_ref();
+        let is_tracing = snapshot.is_some_and(|s| matches!(s.report.state, State::Tracing));
+        let least = if is_tracing { VISIBLE_LEVELS } else { 0.0 };
+        if changed | (std::mem::replace(&mut self.least, least) != least) {
+            self.sort();
         }
         removal
     }
@@ -98,20 +105,18 @@ impl PanelTiles {
 
     /// Returns the sequence that removes all tiles at any moment.
     pub fn removal(&self) -> String {
-        let visible = self.tiles.iter().filter(|tile| !tile.shown.is_empty());
-        let sending = self.sending.iter().map(|sending| sending.tile);
-        let give_up = sending.map(|tile| self.tiles[tile].image.give_up());
-        give_up.chain(visible.map(|tile| tile.image.removal())).collect()
+        let end =
+            |(protocol, _)| TileImage::give_up(protocol) + &TileImage::removal_of_all(protocol);
+        self.grid.map_or_else(String::new, end)
     }
 
     pub fn is_sixel(&self) -> bool {
         matches!(self.grid, Some((Protocol::Sixel(_), _)))
     }
 
-    /// Returns the cell that stands for pixels of a sixel image.
-    pub fn pixel_cell() -> Cell {
-        let place = Rect::ZERO;
-        TileImage { protocol: Protocol::Sixel(0), index: 0, second: false, place }.cell(0, 0)
+    /// Returns `true` if the terminal shows tiles in place of cells, or above them.
+    pub fn replace_cells(&self) -> bool {
+        matches!(self.grid, Some((Protocol::Kitty | Protocol::Sixel(_), _)))
     }
 
     fn is_visible(&self) -> bool {
@@ -129,8 +134,8 @@ impl PanelTiles {
     }
 
     /// Selects the tiles to send: the missing ones with most contrast first, then those that differ
-    /// most from the screen. A difference up to `least` levels RMS is ignored.
-    fn sort(&mut self, least: f64) {
+    /// most from the screen.
+    fn sort(&mut self) {
         let mut ranks: Vec<(f64, usize)> = Vec::new();
         for (i, tile) in self.tiles.iter().enumerate().filter(|(_, tile)| !tile.covered) {
             let pixels = self.pixels(tile);
@@ -138,7 +143,7 @@ impl PanelTiles {
                 true => MISSING + mean_square(&pixels, &pixels[1.min(pixels.len())..]),
                 false => mean_square(&pixels, &tile.shown),
             };
-            if rank > least * least {
+            if rank > self.least * self.least {
                 ranks.push((rank, i));
             }
         }
@@ -165,24 +170,44 @@ impl PanelTiles {
         (0..width * height).map(pixel).collect()
     }
 
+    /// Gives the pixels of `holes` a colour that no other pixel has, which is returned.
+    fn cut(&self, raster: &mut Raster, place: Rect, holes: &[Position]) -> [u8; 3] {
+        let colors = (0..=u16::MAX).map(|n| [n as u8, (n >> 8) as u8, 1]);
+        let key = colors.into_iter().find(|color| !raster.pixels.contains(color));
+        let (key, cell) =
+            (key.unwrap_or_default(), self.grid.map_or([1; 2], |(_, grid)| grid.cell));
+        let place = [place.x, place.y].map(usize::from);
+        for (i, pixel) in raster.pixels.iter_mut().enumerate() {
+            let at = [i % raster.width / cell[0], i / raster.width / cell[1]];
+            let is_in = |hole: &Position| {
+                at == [usize::from(hole.x) - place[0], usize::from(hole.y) - place[1]]
+            };
+            if holes.iter().any(is_in) {
+                *pixel = key;
+            }
+        }
+        key
+    }
+
     /// Appends the next part of a tile to `out`, in at most about `room` bytes. Returns the cells of
     /// the tile if it is complete.
     pub fn next(&mut self, room: usize, out: &mut Vec<u8>) -> Option<Rect> {
         while self.sending.is_none() {
             let tile = self.order.pop()?;
             let pixels = self.pixels(&self.tiles[tile]);
-            let Tile { image, px: [.., width, height], shown, covered } = &self.tiles[tile];
+            let Tile { image, px: [.., width, height], shown, covered, holes } = &self.tiles[tile];
             if *covered || pixels == *shown && !matches!(image.protocol, Protocol::Sixel(_)) {
                 continue;
             }
             let image = TileImage { second: !image.second, ..*image };
-            let raster = Raster { width: *width, height: *height, pixels };
+            let mut raster = Raster { width: *width, height: *height, pixels: pixels.clone() };
+            let key = (!holes.is_empty()).then(|| self.cut(&mut raster, image.place, holes));
             let size = [*width, *height].map(|n| n as u32);
             let png = |image: &Raster| {
-                png_of_rgb(size, image.pixels.as_flattened()).map_err(|error| error.to_string())
+                png_of_rgb(size, image.pixels.as_flattened(), key)
+                    .map_err(|error| error.to_string())
             };
             if let Ok(transfer) = image.encode(&raster, png) {
-                let pixels = raster.pixels;
                 self.sending = Some(Sending { tile, pixels, transfer, sent: 0, open: false });
             }
         }
@@ -205,14 +230,12 @@ impl PanelTiles {
     pub fn paint(&self, target: &mut Buffer, place: Rect, uncovered: &mut [bool]) {
         for Tile { image, .. } in self.tiles.iter().filter(|tile| !tile.shown.is_empty()) {
             for at in image.place.intersection(target.area).positions() {
-                let free = match mask_index(place, at) {
+                let is_free = match mask_index(place, at) {
                     Some(index) => uncovered.get_mut(index).is_some_and(std::mem::take),
                     None => target[at].symbol() == " ",
                 };
-                if free {
+                if is_free {
                     target[at] = image.cell(at.x - image.place.x, at.y - image.place.y);
-                } else if image.protocol == Protocol::Kitty && is_mark(target[at].bg) {
-                    target[at].set_bg(Color::Reset);
                 }
             }
         }
@@ -259,21 +282,37 @@ fn tiles(protocol: Protocol, grid: PixelGrid) -> Vec<Tile> {
             _ => [0, 1].map(|i| whole[i].min(size[i].saturating_sub(start[i]))),
         };
         let image = TileImage { protocol, index, second: false, place: cells };
-        Tile { image, px: [start[0], start[1], width, height], shown: Vec::new(), covered: false }
+        Tile {
+            image,
+            px: [start[0], start[1], width, height],
+            shown: Vec::new(),
+            covered: false,
+            holes: Vec::new(),
+        }
     };
     places.enumerate().map(tile).filter(|tile| tile.px[2] > 0 && tile.px[3] > 0).collect()
 }
 
-/// Returns `true` if text covers a part of `cells`. A mark on the picture, in its colours, does not.
-fn is_covered(cells: Rect, target: &Buffer, (place, uncovered): (Rect, &[bool])) -> bool {
-    cells.intersection(target.area).positions().any(|at| match mask_index(place, at) {
-        Some(index) => !uncovered.get(index).copied().unwrap_or(false) && !is_mark(target[at].bg),
-        None => target[at].symbol() != " ",
-    })
-}
-
-fn is_mark(background: Color) -> bool {
-    matches!(background, Color::Rgb(..) | Color::Indexed(_))
+/// Returns `true` if text covers a part of a tile, and the cells with marks on the picture, in its
+/// colours, at which an image above the text must be transparent.
+fn covering(
+    tile: &TileImage,
+    target: &Buffer,
+    (place, uncovered): (Rect, &[bool]),
+) -> (bool, Vec<Position>) {
+    let (mut covered, mut holes) = (false, Vec::new());
+    for at in tile.place.intersection(target.area).positions() {
+        match mask_index(place, at).map(|index| uncovered.get(index) == Some(&true)) {
+            Some(true) => {}
+            Some(false) if matches!(target[at].bg, Color::Rgb(..) | Color::Indexed(_)) => {
+                holes.push(at);
+            }
+            Some(false) => covered = true,
+            None => covered |= target[at].symbol() != " ",
+        }
+    }
+    holes.retain(|_| tile.protocol == Protocol::Kitty);
+    (covered, holes)
 }
 
 fn mask_index(place: Rect, at: Position) -> Option<usize> {

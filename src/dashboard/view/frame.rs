@@ -54,7 +54,7 @@ fn title(model: &Model) -> String {
     }
 }
 
-/// Returns the texts in the upper border: the channel, the exposure and the tone curve, each unless
+/// Returns the texts in the upper border: channel, exposure, tone curve and zoom, each unless
 /// it is the default. A text with `true` is emphasised.
 fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
@@ -70,6 +70,11 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
     if exposure != 0.0 {
         let sign = if exposure > 0.0 { "+" } else { "−" };
         chips.push((format!("{sign}{} EV", number(exposure.abs())), false));
+    }
+    match model.zoom.map(|zoom| zoom.steps) {
+        None => {}
+        Some(steps @ ..0) => chips.push((format!("zoom 1:{}", 1 << -steps), false)),
+        Some(steps) => chips.push((format!("zoom {}:1", 1 << steps), false)),
     }
     if model.display.tone != Tone::Clip {
         chips.push((model.display.tone.name().to_string(), false));

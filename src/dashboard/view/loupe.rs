@@ -1,7 +1,9 @@
 //! Drawing of the loupe.
 
+use crate::dashboard::text::cut;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::picture::{paint, visible_mask};
+use crate::dashboard::view::pixel_probe::{mark, seen};
 use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -12,7 +14,16 @@ use zerkalo_terminal::cells::{Raster, picture_cells};
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) -> Option<(Buffer, Rect)> {
     let loupe = model.loupe(layout)?;
     let detail = model.loupe.detail.as_ref().filter(|detail| detail.size == loupe.window.size)?;
-    painter.overlay(loupe.frame, "1:1");
+    let [x, y] = [0, 1].map(|i| loupe.window.origin[i] + loupe.window.size[i] / 2);
+    let title = seen(model, [x, y]).map_or("1:1".to_string(), |name| format!("1:1  {name}"));
+    painter.overlay(loupe.frame, &cut(&title, usize::from(loupe.frame.width.saturating_sub(6))));
+    let ends = [0, 1].map(|i| (loupe.window.origin[i], loupe.window.size[i] - 1));
+    for (corner, right, lower) in [('┌', 0, 0), ('┐', 1, 0), ('└', 0, 1), ('┘', 1, 1)] {
+        let point = [ends[0].0 + right * ends[0].1, ends[1].0 + lower * ends[1].1];
+        if let Some([column, row]) = layout.cell_of(point.map(|n| n as f64 + 0.5)) {
+            mark(column, row, corner, painter);
+        }
+    }
     let raster = Raster::from_fn(detail.size[0], detail.size[1], |i| detail.pixels[i]);
     let cells = picture_cells(&raster, model.colors, false);
     let inside = loupe.frame.inner(BORDER);

@@ -90,7 +90,7 @@ impl PictureView {
         scale.low = scale.low.max(1e-3 * scale.high);
         self.legend = Some(Legend::magnitude(scale, unit));
         let tile = |axis: usize, at: usize, cells: usize, tiles: usize| {
-            (pixel_of(window, axis, at, cells) / TILE).min(tiles.saturating_sub(1))
+            (window.pixel(axis, at, cells) / TILE).min(tiles.saturating_sub(1))
         };
         (all > 0).then(|| {
             Raster::from_fn(width, height, |i| {
@@ -176,11 +176,6 @@ fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 
     Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
 }
 
-/// Returns the film pixel along `axis` at the centre of half cell `at` of `cells` across `window`.
-fn pixel_of(window: Window, axis: usize, at: usize, cells: usize) -> usize {
-    window.origin[axis] + (2 * at + 1) * window.size[axis] / (2 * cells)
-}
-
 /// Scales an image of the window `from` of the film to `place` without interpolation. Until the
 /// session returns an image of `place`, the image at hand is shown, whose edge continues outside.
 fn resized(raster: Raster, from: Window, (size, window): Place) -> Raster {
@@ -189,7 +184,7 @@ fn resized(raster: Raster, from: Window, (size, window): Place) -> Raster {
         return raster;
     }
     let texel = |axis: usize, at: usize| {
-        let pixel = pixel_of(window, axis, at, size[axis]).saturating_sub(from.origin[axis]);
+        let pixel = window.pixel(axis, at, size[axis]).saturating_sub(from.origin[axis]);
         (pixel * old[axis] / from.size[axis].max(1)).min(old[axis] - 1)
     };
     Raster::from_fn(size[0], size[1], |i| {

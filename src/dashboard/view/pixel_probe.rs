@@ -17,7 +17,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let place = layout.cell_of([x as f64 + 0.5, y as f64 + 0.5]);
     let [column, row] = place.unwrap_or([layout.picture.x, layout.picture.y]);
     if place.is_some() {
-        mark(column, row, painter);
+        mark(column, row, '┼', painter);
     }
     let lines = readout(model);
     let height = lines.len() as u16 + 2;
@@ -76,15 +76,15 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
 }
 
 /// Returns the label of the object that is visible at a film pixel (column, row).
-fn seen(model: &Model, pixel: [usize; 2]) -> Option<String> {
+pub fn seen(model: &Model, pixel: [usize; 2]) -> Option<String> {
     let hits = model.snapshot.as_ref()?.first_hits.as_deref()?;
     let object = hits.at_pixel(pixel)?.object?;
     let subject = Target::Object(object as usize);
     subject.exists(model.scene()).then(|| subject.label(model.scene()))
 }
 
-/// Draws a cross in a cell, in a colour that contrasts with its background.
-fn mark(column: u16, row: u16, painter: &mut Painter) {
+/// Draws a character in a cell of the picture, in a colour that contrasts with its background.
+pub fn mark(column: u16, row: u16, character: char, painter: &mut Painter) {
     let Some(cell) = painter.buffer.cell_mut((column, row)) else { return };
     let light = |color: Color| match color {
         Color::Rgb(r, g, b) => u32::from(r) * 2 + u32::from(g) * 7 + u32::from(b) > 1400,
@@ -95,5 +95,5 @@ fn mark(column: u16, row: u16, painter: &mut Painter) {
         Color::Rgb(..) => Style::new().fg(Color::Rgb(255, 255, 255)),
         _ => Style::new().add_modifier(Modifier::REVERSED),
     };
-    cell.set_char('┼').set_style(style);
+    cell.set_char(character).set_style(style);
 }

@@ -194,9 +194,8 @@ pub fn hints_line(model: &Model, area: Rect, painter: &mut Painter) {
     } else if let Some(Snapshot { report: Report { state: State::Finished(_), .. }, .. }) =
         model.snapshot.as_deref()
         && model.overlay.is_none()
-        && row.left() > 100
     {
-        row.put_right(&model.graphics.description(), 40, theme.dim());
+        row.put_right(&model.graphics.description(), 2, theme.dim());
     }
 }
 

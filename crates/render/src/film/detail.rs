@@ -28,6 +28,11 @@ impl Window {
         Self { origin, size: [0, 1].map(|i| self.size[i].clamp(1, (size[i] - origin[i]).max(1))) }
     }
 
+    /// Returns the film pixel along `axis` at the centre of cell `at` of `cells` across the window.
+    pub fn pixel(&self, axis: usize, at: usize, cells: usize) -> usize {
+        self.origin[axis] + (2 * at + 1) * self.size[axis] / (2 * cells)
+    }
+
     /// Returns `true` if the window has the pixel (column, row).
     pub fn contains(&self, pixel: [usize; 2]) -> bool {
         (0..2).all(|i| pixel[i].wrapping_sub(self.origin[i]) < self.size[i])

@@ -28,7 +28,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         let levels: Vec<u8> = (0..5 * 3 * 3).map(|i| (i * 37 % 256) as u8).collect();
-        std::fs::write(&path, png_of_rgb([5, 3], &levels).unwrap()).unwrap();
+        std::fs::write(&path, png_of_rgb([5, 3], &levels, None).unwrap()).unwrap();
         let image = read_png(&path).unwrap();
         assert_eq!((image.dimensions(), image.into_raw()), ((5, 3), levels));
         // A truncated file gives an error, or the complete picture if fewer than 16 bytes are

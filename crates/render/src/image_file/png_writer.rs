@@ -99,16 +99,24 @@ fn start<W: Write>(
     encoder.write_header()
 }
 
-/// Encodes `rgb`, the bytes of 8-bit sRGB pixels row by row, as PNG.
+/// Encodes `rgb`, the bytes of 8-bit sRGB pixels row by row, as PNG. Pixels of the colour
+/// `transparent` are transparent.
 ///
 /// # Errors
 /// Fails if the length of `rgb` is not 3 bytes per pixel.
-pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> {
+pub fn png_of_rgb(
+    [width, height]: [u32; 2],
+    rgb: &[u8],
+    transparent: Option<[u8; 3]>,
+) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, width, height);
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(BitDepth::Eight);
     encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
+    if let Some([r, g, b]) = transparent {
+        encoder.set_trns(vec![0, r, 0, g, 0, b]);
+    }
     let mut writer = encoder.write_header()?;
     writer.write_image_data(rgb)?;
     writer.finish()?;

@@ -129,12 +129,13 @@ mod tests {
 
     #[test]
     fn placeholders_of_rows_are_distinct() {
-        let rows: std::collections::BTreeSet<_> = (0..MAX_ROWS).map(|row| placeholder(row, None)).collect();
+        let rows: std::collections::BTreeSet<_> =
+            (0..MAX_ROWS).map(|row| placeholder(row, None)).collect();
         assert_eq!(rows.len(), usize::from(MAX_ROWS));
         assert!(rows.iter().all(|row| row.chars().count() == 2));
         assert!(rows.iter().all(|row| unicode_width::UnicodeWidthStr::width(&**row) == 1));
         assert_eq!(placeholder(0, None), "\u{10eeee}\u{305}");
-        assert_eq!(placeholder(11, None), "\u{10eeee}\u{34c}");
+        assert_eq!(placeholder(11, Some(1)), "\u{10eeee}\u{34c}\u{30d}");
     }
 
     #[test]

@@ -12,6 +12,8 @@ use ratatui::style::{Color, Style};
 const SIDE_PX: usize = 64;
 /// Number of the first image of a tile, beyond that of the viewer.
 const FIRST: u32 = 1000;
+/// Removal of all images on the screen.
+const REMOVE_ALL: &str = "\x1b_Ga=d,d=A,q=2\x1b\\";
 /// Largest number of tiles through tmux, where placeholders encode the number of an image, below
 /// 256, as an indexed colour. Each tile has two numbers.
 const MOST_THROUGH_TMUX: usize = 127;
@@ -72,8 +74,9 @@ impl TileImage {
                 transfer.add(bytes.as_bytes());
             }
             Protocol::Kitty => {
-                // The image is above the colours of cells and below their characters.
-                let keys = format!("i={number},p=1,z=-1,C=1");
+                // The image is above the text: with images below it, kitty 0.26 draws new text over
+                // the old.
+                let keys = format!("i={number},p=1,C=1");
                 kitty::send(&mut transfer, &png(image)?, &keys, &MoveTo(x, y).to_string(), false);
                 let old = Self { second: !self.second, ..*self };
                 transfer.add(old.removal().as_bytes());
@@ -95,9 +98,19 @@ impl TileImage {
         }
     }
 
+    /// Returns the sequence that removes the images of all tiles.
+    pub fn removal_of_all(protocol: Protocol) -> String {
+        match protocol {
+            Protocol::Kitty => REMOVE_ALL.to_string(),
+            // Text overwrites the placeholders.
+            Protocol::KittyThroughTmux => kitty::wrapped(REMOVE_ALL),
+            Protocol::Sixel(_) | Protocol::Blocks => String::new(),
+        }
+    }
+
     /// Returns the sequence that ends an incomplete transfer.
-    pub fn give_up(&self) -> String {
-        match self.protocol {
+    pub fn give_up(protocol: Protocol) -> String {
+        match protocol {
             Protocol::Kitty => kitty::GIVE_UP.to_string(),
             Protocol::KittyThroughTmux => kitty::wrapped(kitty::GIVE_UP),
             Protocol::Sixel(_) => "\x1b\\".to_string(),
@@ -105,19 +118,20 @@ impl TileImage {
         }
     }
 
-    /// Returns the cell at (column, row) of the tile while its image is visible. By sixel, it stands
-    /// for pixels, and is never sent.
+    /// Returns the cell at (column, row) of the tile while its image is visible. Without placeholders
+    /// it is [`TileImage::pixels`].
     pub fn cell(&self, column: u16, row: u16) -> Cell {
-        let mut cell = Cell::new(" ");
-        match self.protocol {
-            Protocol::Kitty | Protocol::Blocks => {}
-            Protocol::Sixel(_) => drop(cell.set_symbol("\u{fffc}")),
-            Protocol::KittyThroughTmux => {
-                let style = Style::new().fg(Color::Indexed(self.number() as u8));
-                cell.set_symbol(&kitty::placeholder(row, Some(column))).set_style(style);
-            }
+        let mut cell = Self::pixels();
+        if self.protocol == Protocol::KittyThroughTmux {
+            let style = Style::new().fg(Color::Indexed(self.number() as u8));
+            cell.set_symbol(&kitty::placeholder(row, Some(column))).set_style(style);
         }
         cell
+    }
+
+    /// Returns the cell that stands for pixels of an image. It is never sent.
+    pub fn pixels() -> Cell {
+        Cell::new("\u{fffc}")
     }
 }
 
@@ -138,10 +152,7 @@ mod tests {
         let image = Raster::from_fn(60, 60, |i| [i as u8; 3]);
         let transfer = tile.encode(&image, |_| Ok(vec![7; 2000])).unwrap();
         let text = String::from_utf8(transfer.bytes).unwrap();
-        assert!(
-            text.starts_with("\x1b[2;3H\x1b_Ga=T,f=100,i=1007,p=1,z=-1,C=1,q=2,m=1;"),
-            "{text:?}"
-        );
+        assert!(text.starts_with("\x1b[2;3H\x1b_Ga=T,f=100,i=1007,p=1,C=1,q=2,m=1;"), "{text:?}");
         assert!(
             text.ends_with("\x1b_Ga=d,d=I,i=1006,q=2\x1b\\"),
             "the old image goes last: {text:?}"

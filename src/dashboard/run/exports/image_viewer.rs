@@ -62,7 +62,7 @@ fn viewer_image(
     let halves = shrunk(&shown, layout.halves);
     ViewerImage::encode(viewport, layout, &shown, halves, |image| {
         let size = layout.shown.map(|n| n as u32);
-        png_of_rgb(size, image.pixels.as_flattened()).map_err(|error| error.to_string())
+        png_of_rgb(size, image.pixels.as_flattened(), None).map_err(|error| error.to_string())
     })
 }
 
