@@ -12,6 +12,7 @@ pub mod editor;
 pub mod hints;
 pub mod key_context;
 pub mod layout;
+pub mod marks;
 pub mod message;
 pub mod model;
 pub mod noise_targets;

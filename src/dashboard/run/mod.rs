@@ -27,6 +27,7 @@ use zerkalo_render::plan::FilmFiles;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::{Checkpoint, Options};
 use zerkalo_scene::{SceneErrors, SceneFile};
+use zerkalo_terminal::cells::Oklab;
 use zerkalo_terminal::{
     Environment, HUNG_UP, InputReader, Screen, SignalQueue, query_capabilities, size,
 };
@@ -134,6 +135,7 @@ fn run_on_terminal(
     };
     model.screen = screen_size;
     model.colors = colors.unwrap_or(terminal.colors);
+    model.on_light = terminal.background.is_some_and(|rgb| Oklab::of(rgb).l > 0.6);
     let input = input::read(input)?;
     let terminal_io = TerminalIo {
         tty: screen.tty.clone(),
