@@ -14,6 +14,7 @@ pub mod hints;
 pub mod key_context;
 pub mod layout;
 pub mod loupe;
+pub mod marks;
 pub mod message;
 pub mod model;
 pub mod noise_targets;

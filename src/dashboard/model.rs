@@ -156,6 +156,8 @@ pub struct Drag {
     pub in_picture: bool,
     /// `true` if the button was pressed on a number in the inspector or a form.
     pub on_number: bool,
+    /// `true` if the drag moves the selection, because it began there.
+    pub moves: bool,
 }
 
 /// View that is not the camera of the scene.
@@ -172,11 +174,13 @@ pub struct FreeView {
 pub struct Model {
     pub screen: [u16; 2],
     pub colors: Colors,
+    /// `true` if the terminal is known to have a light background.
+    pub on_light: bool,
     pub file: File,
     /// Edited scene with its undo history.
     pub history: History,
     /// View in the picture; `None` while it is that of the scene's camera.
-    pub view: Option<FreeView>,
+    pub free_view: Option<FreeView>,
     /// Selected part of the scene, which always exists.
     pub selection: Target,
     /// Objects and lights that are moved, rotated, duplicated and deleted together; if there are
@@ -217,6 +221,11 @@ pub struct Model {
     /// `true` until the first user input. Until then, the hint line has hints for beginners.
     pub first_time: bool,
     pub drag: Option<Drag>,
+    /// Time until which the selection and the lights are marked in the picture; `None` if the user
+    /// has not done anything for a while.
+    pub marks_until: Option<Duration>,
+    /// `true` if the user has turned marks off.
+    pub marks_off: bool,
     /// Time of the last edit, if the next edit may still join its undo step.
     pub last_edit: Option<Duration>,
     /// `true` if the program quits as soon as the pending save has succeeded.
@@ -308,14 +317,14 @@ impl Model {
 
     /// Returns the scene to render: [`Model::scene`] as the view shows it.
     pub fn seen(&self) -> &Arc<Scene> {
-        self.view.as_ref().map_or(self.scene(), |view| &view.scene)
+        self.free_view.as_ref().map_or(self.scene(), |view| &view.scene)
     }
 
     /// Shows the scene from `camera`, which is no edit.
     pub(super) fn set_view(&mut self, camera: Camera) {
         let scene = self.scene();
         let free = camera != scene.camera && camera.faults().is_empty();
-        self.view = free.then(|| FreeView {
+        self.free_view = free.then(|| FreeView {
             left: scene.camera.clone(),
             scene: Arc::new(Scene { camera, ..Scene::clone(scene) }),
         });
@@ -324,7 +333,7 @@ impl Model {
     /// Shows edits of the scene in the view. The view follows an edit of the scene's camera: it
     /// becomes the camera that was moved, or gets the lens that was changed.
     pub(super) fn follow_edits(&mut self) {
-        let Some(FreeView { left, scene: seen }) = self.view.take() else { return };
+        let Some(FreeView { left, scene: seen }) = self.free_view.take() else { return };
         let now = &self.scene().camera;
         if *now == left {
             self.set_view(seen.camera.clone());
@@ -397,6 +406,7 @@ impl Model {
     /// Returns the time at which the model needs the next
     /// [`Tick`](crate::dashboard::message::Message::Tick); `None` if it needs none.
     pub fn next_timeout(&self) -> Option<Duration> {
-        self.notice.as_ref().and_then(|notice| notice.until)
+        let notice = self.notice.as_ref().and_then(|notice| notice.until);
+        notice.into_iter().chain(self.marks_until).min()
     }
 }

@@ -119,6 +119,9 @@ fn camera_stories() -> Vec<Story> {
         story("fly right", "w d", |_, d| eye(d)[0] > 0.0),
         story("fly up", "w r", |_, d| eye(d)[1] > 1.0),
         story("fly down", "w f", |_, d| eye(d)[1] < 1.0),
+        selected("marks of lights and selection on or off", BALL, "Alt-m", |_, d| {
+            !d.model.shows_marks() && d.notice() == "marks off"
+        }),
         selected("frame the selection", BALL, "f", |_, d| {
             target(d) == [0.0, 1.0, 0.0] && eye(d)[2] < 3.0
         }),
@@ -137,7 +140,7 @@ fn camera_stories() -> Vec<Story> {
             (d.scene().camera.focus_depth() - 4.5).abs() < 0.01
         }),
         story("back to the camera of the scene", "Left Up h", |a, d| {
-            a.camera == d.scene().camera && d.model.view.is_none()
+            a.camera == d.scene().camera && d.model.free_view.is_none()
         }),
         story("make this view the camera", "Left H", |_, d| {
             eye(d)[0] < 0.0 && d.model.scene().camera == d.scene().camera && d.model.is_unsaved()

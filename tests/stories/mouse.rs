@@ -164,3 +164,46 @@ fn click_places_probe() {
     assert_eq!(desk.model.probe, None);
     assert!(desk.asked(|e| matches!(e, Effect::View(view) if view.probe.is_none())));
 }
+
+#[test]
+fn drag_from_selected_object_moves_it_as_one_undo_step() {
+    let mut desk = Desk::new(ROOM);
+    let cell = middle(&desk);
+    desk.drag(Button::Left, cell, [6, 0]);
+    assert!(desk.text() == ROOM && desk.model.free_view.is_some(), "not selected: it orbits");
+    desk.keys("h").click(cell[0], cell[1]).drag(Button::Left, cell, [6, 2]);
+    let [x, y, z] = center(&desk);
+    assert!(x > 0.3 && y == 1.0 && z > 0.1 && desk.model.free_view.is_none(), "{x} {y} {z}");
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM);
+    // The floor fills the view.
+    desk.select(Target::Object(0));
+    let image = desk.model.layout().unwrap().image;
+    desk.drag(Button::Left, [cell[0], image.y + image.height - 1], [6, 0]);
+    assert!(desk.text() == ROOM && desk.model.free_view.is_some());
+}
+
+#[test]
+fn mark_picks_and_moves_its_light() {
+    let mut desk = Desk::new(ROOM);
+    (0..10).for_each(|_| {
+        desk.keys("PageDown");
+    });
+    assert!(!desk.model.shows_marks(), "nothing is selected");
+    desk.select(Target::Object(1));
+    desk.keys("Esc");
+    let layout = desk.model.layout().unwrap();
+    let [mark] = desk.model.light_marks(&layout)[..] else { panic!("one light") };
+    desk.click(mark.cell[0], mark.cell[1]);
+    assert_eq!(desk.model.selection, Target::Light(0));
+    desk.drag(Button::Left, mark.cell, [-5, 0]);
+    let moved = desk.scene().lights[0].position().unwrap();
+    assert!(moved[0] < 1.5 && moved[1] == 4.0, "{moved:?}");
+    let now = desk.model.light_marks(&layout)[0].cell;
+    assert!(now[0].abs_diff(mark.cell[0] - 5) <= 1, "it stays under the mouse: {now:?}");
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM);
+    desk.now += Duration::from_secs(5);
+    desk.send(Message::Tick);
+    assert!(desk.model.light_marks(&layout).is_empty(), "marks fade");
+}

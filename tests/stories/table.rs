@@ -75,7 +75,9 @@ fn keys_manual() -> String {
 /// Mouse gestures and their effects, for docs/keys.md.
 const MOUSE: &[(&str, &str)] = &[
     ("click in the picture", "selects the visible object; while probing: shows the pixel"),
-    ("drag in the picture", "orbits; while moving: moves the selection in the ground plane"),
+    ("click on the mark of a light", "selects the light"),
+    ("drag from the selected object or the mark of a light", "moves it in the ground plane"),
+    ("other drag in the picture", "orbits; while moving: moves the selection in the ground plane"),
     ("drag with the right button, or with Ctrl or Alt", "pans; while moving: moves it up and down"),
     ("click with the right button, or with Ctrl or Alt", "focuses the lens on the visible point"),
     ("drag in the picture while zoomed", "pans the picture; the camera stays"),

@@ -10,7 +10,7 @@ fn eye(desk: &Desk) -> [f64; 3] {
 fn view_is_no_edit_until_it_becomes_the_camera() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Left Up PageUp w a Esc Alt-Up f");
-    assert!(desk.model.view.is_some() && desk.text() == ROOM && !desk.model.is_unsaved());
+    assert!(desk.model.free_view.is_some() && desk.text() == ROOM && !desk.model.is_unsaved());
     assert!(!desk.asked(|e| matches!(e, Effect::Autosave(Some(_)))));
     let seen = desk.scene().camera.clone();
     desk.keys("Ctrl-s");
@@ -21,7 +21,7 @@ fn view_is_no_edit_until_it_becomes_the_camera() {
     assert!(desk.asked(shown), "what is seen");
     assert_eq!(desk.scene().camera, seen, "an edit of the mirror");
     desk.keys("u H");
-    assert!(desk.model.view.is_none() && desk.model.is_unsaved());
+    assert!(desk.model.free_view.is_none() && desk.model.is_unsaved());
     assert_eq!(desk.model.scene().camera, seen);
     desk.keys("u");
     assert_eq!(desk.text(), ROOM);
@@ -34,13 +34,13 @@ fn view_is_no_edit_until_it_becomes_the_camera() {
 fn view_follows_edits_of_the_camera() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Left Enter Right");
-    assert!(desk.model.view.is_none() && eye(&desk) == [0.1, 1.0, 5.0], "{:?}", eye(&desk));
+    assert!(desk.model.free_view.is_none() && eye(&desk) == [0.1, 1.0, 5.0], "{:?}", eye(&desk));
     // The lens is that of the camera, and undo closes both.
     desk.keys("Esc Left *");
     let [seen, own] = [desk.model.seen(), desk.model.scene()].map(|s| s.camera.lens_radius());
-    assert!(desk.model.view.is_some() && seen > 0.0 && seen == own, "{seen} {own}");
+    assert!(desk.model.free_view.is_some() && seen > 0.0 && seen == own, "{seen} {own}");
     desk.keys("u");
-    assert!(desk.model.view.is_some() && desk.scene().camera.lens_radius() == 0.0);
+    assert!(desk.model.free_view.is_some() && desk.scene().camera.lens_radius() == 0.0);
 }
 
 #[test]

@@ -27,12 +27,14 @@ const ATTRIBUTES: &str = "\x1b[c";
 /// - name and version of the terminal (XTVERSION)
 /// - background colour (OSC 11)
 /// - support of synchronised updates (mode 2026)
-/// - test of kitty's graphics protocol by an image that is not shown
 /// - largest number of colours of a sixel image
 /// - largest width and height of a sixel image
 /// - width and height of a cell in pixels
 const REQUESTS: &str = "\x1b[48;2;1;2;3m\x1bP$qm\x1b\\\x1b[0m\x1b[>q\x1b]11;?\x1b\\\x1b[?2026$p\
-                         \x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\\x1b[?1;1;0S\x1b[?2;1;0S\x1b[16t";
+                         \x1b[?1;1;0S\x1b[?2;1;0S\x1b[16t";
+/// Test of kitty's graphics protocol by an image that is not shown. A multiplexer would take it for
+/// a title.
+const GRAPHICS_REQUEST: &str = "\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\";
 /// Requests that tmux passes on to the terminal: a test of kitty's graphics protocol, and
 /// XTVERSION.
 const REQUESTS_THROUGH_TMUX: &str = "\x1bPtmux;\x1b\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\x1b\\\x1b\\\
@@ -75,12 +77,14 @@ pub fn query_capabilities(
     let sent_at = Instant::now();
     let is_minimal =
         ["linux", "vt"].iter().any(|term| capabilities.environment.term.starts_with(term));
-    let through = match capabilities.environment.multiplexer {
+    let graphics = match capabilities.environment.multiplexer {
+        None if is_minimal => "",
+        None => GRAPHICS_REQUEST,
         Some(Multiplexer::Tmux) => REQUESTS_THROUGH_TMUX,
-        _ => "",
+        Some(Multiplexer::Screen) => "",
     };
     let requests = if is_minimal { "" } else { REQUESTS };
-    tty.write([through, requests, ATTRIBUTES].concat().as_bytes())?;
+    tty.write([graphics, requests, ATTRIBUTES].concat().as_bytes())?;
     listen(input, sent_at + patience, is_ending, |at, reply| {
         capabilities.round_trip.get_or_insert(at.saturating_duration_since(sent_at));
         capabilities.learn(reply);

@@ -30,6 +30,7 @@ use zerkalo_render::plan::FilmFiles;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::{Checkpoint, Options};
 use zerkalo_scene::{SceneErrors, SceneFile};
+use zerkalo_terminal::cells::Oklab;
 use zerkalo_terminal::image::GraphicsMode;
 use zerkalo_terminal::{
     Environment, HUNG_UP, InputReader, Screen, SignalQueue, cell_px, query_capabilities, size,
@@ -144,6 +145,7 @@ fn run_on_terminal(
     model.colors = colors.unwrap_or(terminal.colors);
     terminal.cell_px = cell_px().or(terminal.cell_px);
     model.graphics = Graphics::new(terminal.clone(), graphics);
+    model.on_light = terminal.background.is_some_and(|rgb| Oklab::of(rgb).l > 0.6);
     let input = input::read(input)?;
     let terminal_io = TerminalIo {
         tty: screen.tty.clone(),

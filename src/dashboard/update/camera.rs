@@ -95,7 +95,7 @@ impl UpdateContext<'_> {
 
     /// Goes back to the camera of the scene.
     pub(super) fn leave_view(&mut self) {
-        if self.model.view.take().is_some() {
+        if self.model.free_view.take().is_some() {
             self.show();
         }
         self.say("the camera of the scene");

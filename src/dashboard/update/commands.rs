@@ -127,6 +127,7 @@ pub static COMMANDS: &[Command] = &[
     command("camera", "frame the selection", &[(Anywhere, "f")], |c| c.frame()).hints(&[hint(&[H::In(Outline)], 6, "f", "frame")]),
     command("camera", "back to the camera of the scene", &[(Anywhere, "h"), (Picture, "Home")], |c| c.leave_view()),
     command("camera", "make this view the camera", &[(Anywhere, "H")], |c| c.keep_view()),
+    command("camera", "marks of lights and selection on or off", &[(Anywhere, "Alt-m")], |c| c.toggle_marks()),
     command("camera", "open the aperture", &[(Anywhere, "Alt-o")], |c| c.aperture(1.0)).also("blur depth lens"),
     command("camera", "close the aperture", &[(Anywhere, "Alt-c")], |c| c.aperture(-1.0)),
     command("camera", "focus on the probe or the selection", &[(Anywhere, "F")], |c| c.focus()),

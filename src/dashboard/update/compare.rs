@@ -72,6 +72,11 @@ impl UpdateContext<'_> {
         self.say(format!("view: {}", self.model.channel.name()));
     }
 
+    pub(super) fn toggle_marks(&mut self) {
+        self.model.marks_off = !self.model.marks_off;
+        self.say(if self.model.marks_off { "marks off" } else { "marks on" });
+    }
+
     pub(super) fn toggle_probe(&mut self) {
         if self.model.mode == Mode::Probe {
             self.end_mode();

@@ -89,7 +89,7 @@ impl UpdateContext<'_> {
                 self.model.file.is_new = false;
                 self.model.history.mark_saved(scene);
                 self.model.last_edit = None;
-                let view = self.model.view.as_ref();
+                let view = self.model.free_view.as_ref();
                 let view = view.map_or("", |_| " · the view is not saved: H makes it the camera");
                 self.notify(Tone::Good, format!("saved {}{view}", self.model.file.name), Some(3.0));
                 // The scene may have been edited while it was being saved.

@@ -37,8 +37,17 @@ use zerkalo_scene::value::sanitized;
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
     let mut context = UpdateContext { model, now, effects: Vec::new(), follow: false, typed: None };
     context.model.notice.take_if(|notice| notice.until.is_some_and(|until| until <= now));
+    let marked = |model: &Model| model.shows_marks().then(|| model.selection.clone());
+    let before = marked(context.model);
+    context.model.marks_until.take_if(|until| *until <= now);
+    if matches!(message, Message::Key(_) | Message::Mouse(_) | Message::Paste(_)) {
+        context.model.marks_until = Some(now + MARKED);
+    }
     context.handle(message);
     context.normalize();
+    if marked(context.model) != before {
+        context.repaint();
+    }
     context.effects
 }
 
@@ -52,6 +61,9 @@ pub(super) struct UpdateContext<'a> {
     /// Character of the key that ran the current command; `None` if the key types none.
     typed: Option<char>,
 }
+
+/// Time after the last input for which the selection and the lights are marked.
+const MARKED: Duration = Duration::from_secs(4);
 
 /// Longest time between edits that form one undo step, longer than the delay after which a held key
 /// repeats.

@@ -1,13 +1,15 @@
 //! Mouse: clicks select or focus, drags orbit or move, the wheel dollies or scrolls.
 
+use crate::dashboard::marks::LightMark;
 use crate::dashboard::panel_lines::outline;
 use crate::dashboard::{
-    Drag, FieldList, Focus, Mode, OutlineLine, Overlay, PanelLine, UpdateContext,
+    Drag, FieldList, Focus, Layout, Mode, OutlineLine, Overlay, PanelLine, UpdateContext,
 };
 use glam::DVec3;
 use ratatui::layout::Rect;
+use zerkalo_kernel::primitive::BoundingSphere;
 use zerkalo_scene::Scene;
-use zerkalo_scene::edit::{SceneSettings, Target, Widget};
+use zerkalo_scene::edit::{SceneSettings, Target, Widget, bounds};
 use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
 /// Number of lines that a list scrolls per tick of the wheel.
@@ -62,8 +64,18 @@ impl UpdateContext<'_> {
             // Watched films have no camera to orbit and no objects to select.
             let is_inert = self.model.watch.is_some() && self.model.mode != Mode::Probe;
             let (last, in_picture) = ([column, row], is_in(mouse, layout.image) && !is_inert);
-            self.model.drag =
-                Some(Drag { button, modified, last, moved: false, in_picture, on_number: false });
+            let drag = Drag {
+                button,
+                modified,
+                last,
+                moved: false,
+                in_picture,
+                on_number: false,
+                moves: false,
+            };
+            let grabs = button == Button::Left && !modified && self.model.mode == Mode::Orbit;
+            let moves = grabs && in_picture && self.grab(&layout, mouse);
+            self.model.drag = Some(Drag { moves, ..drag });
         } else if let Some((rows, _)) = self.model.inspector_rows()
             && is_in(mouse, layout.inspector)
         {
@@ -78,6 +90,23 @@ impl UpdateContext<'_> {
         {
             self.press_in_outline(rows, mouse);
         }
+    }
+
+    /// Selects the light whose mark is under the mouse. Returns `true` if a drag from here moves the
+    /// selection: from its mark, or from the selected object unless that fills the view.
+    fn grab(&mut self, layout: &Layout, mouse: Mouse) -> bool {
+        let at = [mouse.column, mouse.row];
+        let under = |mark: &LightMark| mark.cell == at || mark.arrow.is_some_and(|(_, c)| c == at);
+        if let Some(mark) = self.model.light_marks(layout).into_iter().find(under) {
+            self.select(Target::Light(mark.light));
+            return true;
+        }
+        let Target::Object(selected) = self.model.selection else { return false };
+        let eye = DVec3::from_array(self.seen().camera.eye);
+        let fills = |ball: BoundingSphere| ball.center.distance(eye) <= 2.0 * ball.radius;
+        let hit = self.pixel_at(mouse).and_then(|pixel| first_hit(self.seen(), pixel));
+        hit.is_some_and(|(object, _)| object == selected)
+            && !bounds(self.scene(), &self.model.selection).is_none_or(fills)
     }
 
     /// Selects the part of the scene on the clicked line. If the outline has the focus and the part
@@ -117,7 +146,15 @@ impl UpdateContext<'_> {
             .is_some_and(|field| matches!(field.property.widget, Widget::Numbers | Widget::Color));
         let Mouse { column, row, modified, .. } = mouse;
         let (last, button) = ([column, row], Button::Left);
-        let drag = Drag { button, modified, last, moved: false, in_picture: false, on_number };
+        let drag = Drag {
+            button,
+            modified,
+            last,
+            moved: false,
+            in_picture: false,
+            on_number,
+            moves: false,
+        };
         self.model.drag = Some(drag).filter(|drag| drag.on_number);
         match line.filter(|line| lines.get(*line).and_then(PanelLine::entry).is_some()) {
             Some(line) if opens && line == cursor => self.open_row(),
@@ -172,6 +209,7 @@ impl UpdateContext<'_> {
         }
         let other = drag.button != Button::Left || drag.modified;
         match (self.model.mode, other) {
+            _ if drag.moves => self.move_by_hand(right, down, false),
             (Mode::Probe, _) => self.probe_at(mouse),
             (Mode::Move, upright) => self.move_by_hand(right, down, upright),
             (Mode::Rotate, false) => self.rotate_selection(right * 2.0),
@@ -201,6 +239,10 @@ impl UpdateContext<'_> {
 
     /// Probes, focuses the lens on, or selects what is visible under the mouse.
     fn click(&mut self, drag: Drag, mouse: Mouse) {
+        if drag.moves && matches!(self.model.selection, Target::Light(_)) {
+            let label = self.model.selection.label(self.scene());
+            return self.say(format!("{label} · drag moves it · L on, off"));
+        }
         if self.model.mode == Mode::Probe && drag.button == Button::Left && !drag.modified {
             self.probe_at(mouse);
             return;

@@ -79,7 +79,7 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
     if model.display.tone != Tone::Clip {
         chips.push((model.display.tone.name().to_string(), false));
     }
-    if model.view.is_some() {
+    if model.free_view.is_some() {
         chips.push(("view, not the camera · H keeps it, h leaves it".to_string(), true));
     }
     chips
@@ -87,10 +87,14 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
 
 /// Describes the mode; `None` in the default mode.
 fn mode(model: &Model) -> Option<String> {
-    let selected = || model.selection.title(model.scene());
+    let selected = || {
+        let place = model.place_of_selection().map(|p| p.to_array().map(number).join(" "));
+        let place = place.map_or(String::new(), |place| format!(" · {place}"));
+        format!("{}{place}", model.selection.title(model.scene()))
+    };
     Some(match model.mode {
-        Mode::Orbit => return None,
-        Mode::Move => format!("moving {}", selected()),
+        Mode::Orbit if !model.drag.is_some_and(|drag| drag.moves) => return None,
+        Mode::Orbit | Mode::Move => format!("moving {}", selected()),
         Mode::Rotate => format!("rotating {}", selected()),
         Mode::Fly => "flying".to_string(),
         Mode::Probe => "probing".to_string(),

@@ -7,6 +7,7 @@ mod ground_grid;
 mod image_viewer;
 mod legend;
 mod loupe;
+mod marks;
 mod message_view;
 mod outline;
 mod overlay;
@@ -57,6 +58,8 @@ impl View {
                 false => self.imager.raster(model, layout),
             };
             let raster = raster.unwrap_or_default();
+            let is_negative = model.on_light && model.colors == Colors::Mono;
+            let raster = if is_negative { raster.negative() } else { raster };
             self.picture = picture_cells(&raster, model.colors, settled);
             self.made_for = Some(version);
         }
@@ -66,7 +69,7 @@ impl View {
     /// Draws `model` into `buffer`, which must be empty and have the size of the screen. Returns
     /// the position of the text cursor.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
-        let theme = Theme { colors: model.colors };
+        let theme = Theme { colors: model.colors, on_light: model.on_light };
         let painter = &mut Painter { theme, buffer };
         (self.place, self.uncovered) = (Rect::ZERO, Vec::new());
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {
@@ -86,6 +89,7 @@ impl View {
             message_view::broken(model, &layout, painter);
         } else {
             picture::paint(&self.picture, layout.image, painter.buffer);
+            marks::draw(model, &layout, painter);
             magnified = loupe::draw(model, &layout, painter);
             message_view::failure(model, &layout, painter);
             message_view::empty(model, &layout, painter);

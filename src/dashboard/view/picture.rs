@@ -2,6 +2,7 @@
 
 use crate::dashboard::view::false_color::{NO_HIT, Scale, difference, normal_color, object_color};
 use crate::dashboard::view::legend::Legend;
+use crate::dashboard::view::marks;
 use crate::dashboard::{DisplayChannel, Layout, Model, Overlay};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -43,9 +44,22 @@ pub fn is_settled(model: &Model) -> bool {
 }
 
 impl PictureView {
-    /// Returns the selected channel in the half cells of `layout`, or `None` if its data are missing.
+    /// Returns the selected channel in the half cells of `layout`, with the outline of the selection. Returns
+    /// `None` if the channel's data are missing.
     pub fn raster(&mut self, model: &Model, layout: &Layout) -> Option<Raster> {
         let size = (layout.raster, layout.window);
+        let mut raster = self.channel(model, size)?;
+        let white_if = |inside: bool| [if inside { 255 } else { 0 }; 3];
+        let mask = |s| hit_colors(s, size, |hit| white_if(marks::is_selected(model, hit)));
+        if let Some(mask) = model.snapshot.as_deref().filter(|_| model.shows_marks()).and_then(mask)
+        {
+            marks::outline(&mut raster, &mask);
+        }
+        Some(raster)
+    }
+
+    /// Returns the selected channel in `size` half cells, or `None` if its data are missing.
+    fn channel(&mut self, model: &Model, size: Place) -> Option<Raster> {
         self.legend = None;
         let snapshot = model.snapshot.as_deref()?;
         match model.channel {

@@ -8,8 +8,11 @@ use ratatui::style::{Color, Modifier, Style};
 use zerkalo_render::film::quantised_8;
 use zerkalo_scene::edit::Target;
 
-/// Width of the box in columns, border included.
-const WIDTH: u16 = 36;
+/// Least width of the box in columns, border included.
+const WIDTH: usize = 36;
+/// Columns of the box besides the values, and the swatch beside the levels.
+const BESIDE: usize = 13;
+const SWATCH: usize = 4;
 
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let theme = painter.theme;
@@ -21,21 +24,28 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     }
     let lines = readout(model);
     let height = lines.len() as u16 + 2;
+    let widest = (0..)
+        .zip(&lines)
+        .map(|(i, (_, value))| columns(value) + BESIDE + if i == 1 { SWATCH } else { 0 });
+    let width = widest.fold(WIDTH, usize::max) as u16;
     let area = layout.picture;
-    if area.width < WIDTH + 4 || area.height < height + 4 {
+    if area.width < width + 4 || area.height < height + 4 {
         let mut row = painter.row(area, area.height.saturating_sub(1));
-        row.skip(2);
-        for (name, value) in lines.iter().take(2) {
-            row.put(&format!(" {name} {value} "), theme.text());
+        row.skip(1);
+        for (name, value) in lines.iter().take(3) {
+            let text = format!(" {name} {value} ");
+            if columns(&text) < row.left() {
+                row.put(&text, theme.text());
+            }
         }
         return;
     }
     // The box is in the corner that is farthest from the mark.
     let in_left = column < area.x + area.width / 2;
     let in_upper = row < area.y + area.height / 2;
-    let x_box = if in_left { area.right() - WIDTH - 2 } else { area.x + 2 };
+    let x_box = if in_left { area.right() - width - 2 } else { area.x + 2 };
     let y_box = if in_upper { area.bottom() - height - 1 } else { area.y + 1 };
-    let frame = Rect { x: x_box, y: y_box, width: WIDTH, height };
+    let frame = Rect { x: x_box, y: y_box, width, height };
     painter.overlay(frame, &format!("pixel {x}, {y}"));
     let inner = frame.inner(BORDER);
     for (i, (name, value)) in (0..).zip(&lines) {

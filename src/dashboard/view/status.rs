@@ -54,7 +54,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         let text = format!("writing {width}×{height}  {:.0} %{left}", 100.0 * export.progress);
         parts.push(part(0, vec![(text, theme.accent())]));
     }
-    if model.fullscreen && model.view.is_some() {
+    if model.fullscreen && model.free_view.is_some() {
         parts.push(part(1, vec![("view, not the camera".to_string(), theme.warn())]));
     }
     let watching = model.watch.is_some();

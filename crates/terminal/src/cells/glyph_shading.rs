@@ -2,7 +2,7 @@
 
 use crate::cells::oklab::{Oklab, level, linear};
 use crate::cells::palette_quantisation::{QuantisedPalette, xterm_rgb};
-use crate::cells::{PLAIN_BG, PLAIN_FG, PictureCell};
+use crate::cells::{PLAIN_BG, PLAIN_FG, PictureCell, Raster};
 use ratatui::style::Color;
 use std::sync::LazyLock;
 
@@ -40,13 +40,31 @@ pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
     Oklab::of_linear([0, 1, 2].map(|c| coverage * fg[c] + (1.0 - coverage) * bg[c]))
 }
 
-/// Cells for colours: each of 16 colours alone, and each shading glyph on a neutral background.
+/// Greys, whose sparse glyphs on black show dark greys.
+const GREYS: [u8; 3] = [7, 8, 15];
+/// Mean OKLab lightness to which [`tone_curve`] raises dark pictures.
+const MEAN_LIGHTNESS: f32 = 0.5;
+
+/// Returns the curve of levels that shows a picture without colours: a power of the linear light,
+/// which makes a dark picture brighter, because glyphs show few dark greys.
+pub fn tone_curve(raster: &Raster) -> [u8; 256] {
+    let sum: f32 = raster.pixels.iter().map(|rgb| Oklab::of(*rgb).l).sum();
+    let mean = (sum / raster.pixels.len().max(1) as f32).clamp(0.01, 0.99);
+    let power = (MEAN_LIGHTNESS.ln() / mean.ln()).clamp(0.5, 1.0);
+    std::array::from_fn(|c| level(linear([c as u8; 3])[0].powf(power)))
+}
+
+/// Cells for colours: each of 16 colours alone, each shading glyph on a neutral background, and
+/// each sparse glyph in grey on black.
 static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     let mixed = NEUTRAL.into_iter().flat_map(|bg| (0..16).map(move |fg| (fg, bg)));
     let mixed = mixed.filter(|(fg, bg)| fg != bg).flat_map(|(fg, bg)| {
         SHADES.map(|glyph| PictureCell { glyph, fg: Color::Indexed(fg), bg: Color::Indexed(bg) })
     });
-    (0..16).map(flat).chain(mixed).collect()
+    let sparse = COVERAGE[1..5].iter().flat_map(|(glyph, _)| {
+        GREYS.map(|fg| PictureCell { glyph: *glyph, fg: Color::Indexed(fg), bg: Color::Indexed(0) })
+    });
+    (0..16).map(flat).chain(mixed).chain(sparse).collect()
 });
 
 /// Mean colours of [`CELLS`], in the same order.

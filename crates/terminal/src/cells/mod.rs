@@ -8,7 +8,7 @@ mod palette_quantisation;
 
 pub use oklab::{Oklab, level, linear};
 pub use palette_quantisation::nearest_xterm;
-use palette_quantisation::xterm_rgb;
+use palette_quantisation::{vivid, xterm_rgb};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -57,6 +57,14 @@ impl Raster {
     /// Creates an image. `pixel` returns the colour of each pixel, which are numbered row by row.
     pub fn from_fn(width: usize, height: usize, pixel: impl FnMut(usize) -> [u8; 3]) -> Self {
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
+    }
+
+    /// Returns the negative, which a terminal without colours and with a light background shows as
+    /// a positive.
+    pub fn negative(&self) -> Self {
+        let shown = glyph_shading::tone_curve(self);
+        let pixel = |i: usize| self.pixels[i].map(|c| 255 - shown[usize::from(c)]);
+        Self::from_fn(self.width, self.height, pixel)
     }
 }
 
@@ -126,10 +134,18 @@ impl From<&Cell> for PictureCell {
 /// Converts `raster` to cells of a terminal with `colors`. In 256 colours, the picture is dithered
 /// only if it is `settled`, because a changing picture would flicker.
 ///
-/// If the raster has an odd number of rows, the lower halves of the last row of cells are empty.
+/// If the raster has an odd number of rows, the lower halves of the last row of cells are empty, or
+/// continue the upper halves in cells with shading glyphs. With few colours, dark colours become
+/// more saturated, and without colours, a dark picture becomes brighter: distinct surfaces stay
+/// distinct.
 pub fn picture_cells(raster: &Raster, colors: Colors, settled: bool) -> Buffer {
     let dithered = (settled && colors == Colors::Indexed).then(|| dither::dithered(raster));
-    let rgb = |pixel: usize| raster.pixels[pixel];
+    let curve = (colors == Colors::Mono).then(|| glyph_shading::tone_curve(raster));
+    let rgb = |pixel: usize| match (&curve, colors) {
+        (Some(curve), _) => raster.pixels[pixel].map(|c| curve[usize::from(c)]),
+        (None, Colors::True) => raster.pixels[pixel],
+        (None, _) => vivid(raster.pixels[pixel]),
+    };
     let color = |pixel: usize| match &dithered {
         Some(indices) => Color::Indexed(indices[pixel]),
         None if colors == Colors::True => Color::from(rgb(pixel)),
@@ -140,13 +156,12 @@ pub fn picture_cells(raster: &Raster, colors: Colors, settled: bool) -> Buffer {
         let lower = Some(upper + raster.width).filter(|pixel| *pixel < raster.pixels.len());
         match (colors, lower) {
             (Colors::True | Colors::Indexed, _) => two_halves(color(upper), lower.map(color)),
-            (Colors::Sixteen, Some(lower)) => glyph_shading::pair(rgb(upper), rgb(lower)),
-            (Colors::Sixteen, None) => {
-                two_halves(Color::Indexed(glyph_shading::nearest(rgb(upper))), None)
+            (Colors::Sixteen, lower) => {
+                glyph_shading::pair(rgb(upper), rgb(lower.unwrap_or(upper)))
             }
-            (Colors::Mono, Some(lower)) => glyph_shading::pair_mono(rgb(upper), rgb(lower)),
-            (Colors::Mono, None) if Oklab::of(rgb(upper)).l < 0.5 => PictureCell::default(),
-            (Colors::Mono, None) => two_halves(Color::Reset, None),
+            (Colors::Mono, lower) => {
+                glyph_shading::pair_mono(rgb(upper), rgb(lower.unwrap_or(upper)))
+            }
         }
     };
     let area = Rect::new(0, 0, raster.width as u16, raster.height.div_ceil(2) as u16);

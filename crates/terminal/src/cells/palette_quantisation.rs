@@ -85,6 +85,22 @@ pub fn nearest_xterm(rgb: [u8; 3]) -> u8 {
     FIRST + XTERM.nearest(rgb) as u8
 }
 
+/// Luma from which [`vivid`] keeps colours, and luma up to which it is strongest.
+const PALE_LUMA: [f32; 2] = [141.0, 85.0];
+/// Largest factor by which [`vivid`] raises the saturation.
+const VIVIDNESS: f32 = 2.3;
+
+/// Raises the saturation of dark colours. Dark colours of palettes are grey or saturated, so that
+/// the nearest one of a weak colour has no hue.
+pub fn vivid(rgb: [u8; 3]) -> [u8; 3] {
+    let channels = rgb.map(f32::from);
+    // Luma weights of Rec. 709.
+    let luma = 0.2126 * channels[0] + 0.7152 * channels[1] + 0.0722 * channels[2];
+    let darkness = ((PALE_LUMA[0] - luma) / (PALE_LUMA[0] - PALE_LUMA[1])).clamp(0.0, 1.0);
+    let factor = 1.0 + (VIVIDNESS - 1.0) * darkness;
+    channels.map(|c| (luma + factor * (c - luma)).round().clamp(0.0, 255.0) as u8)
+}
+
 /// Returns the OKLab lightness, 0..=1, of xterm's colour `index` (16 to 255).
 pub fn xterm_lightness(index: u8) -> f32 {
     XTERM.colors[usize::from(index.saturating_sub(FIRST))].l
@@ -109,6 +125,21 @@ mod tests {
         for index in FIRST..=255 {
             assert_eq!(nearest_xterm(xterm_rgb(index)), index);
         }
+    }
+
+    #[test]
+    fn dark_hues_are_kept_before_greys() {
+        // Frame, floor and ball of the opening scene, in the shade.
+        let cases: [([u8; 3], fn([u8; 3]) -> bool); 3] = [
+            ([84, 54, 26], |[r, g, b]| r > g && g >= b),
+            ([96, 72, 50], |[r, g, b]| r >= g && g > b),
+            ([80, 28, 30], |[r, g, b]| r > g && g == b),
+        ];
+        for (rgb, is_hue) in cases {
+            let shown = xterm_rgb(nearest_xterm(vivid(rgb)));
+            assert!(is_hue(shown), "{rgb:?} {shown:?}");
+        }
+        assert_eq!([vivid([90; 3]), vivid([200, 180, 190])], [[90; 3], [200, 180, 190]]);
     }
 
     /// Checks the cached search for the nearest palette colour, which rounds colours, against the

@@ -27,18 +27,44 @@ fn equal_halves_are_a_space() {
 }
 
 #[test]
-fn odd_last_row_leaves_lower_half_plain() {
+fn odd_last_row_is_half_a_cell_or_continues() {
     for colors in Colors::ALL {
         for settled in [false, true] {
             let cells = picture_cells(&checker(2, 3), colors, settled);
             assert_eq!(cells.area, Rect::new(0, 0, 2, 2));
-            for cell in &cells.content[2..] {
-                let cell = PictureCell::from(cell);
-                assert_eq!(cell.bg, Color::Reset, "{colors:?}");
-                assert!(cell.glyph == '▀' || cell.glyph == ' ', "{colors:?}");
+            let row = |cells: &Buffer| {
+                cells.content[2..].iter().map(PictureCell::from).collect::<Vec<_>>()
+            };
+            if matches!(colors, Colors::True | Colors::Indexed) {
+                assert!(row(&cells).iter().all(|c| c.bg == Color::Reset && c.glyph == '▀'));
+            } else {
+                let longer =
+                    Raster::from_fn(2, 4, |i| if [0, 3, 4, 6].contains(&i) { RED } else { SKY });
+                assert_eq!(
+                    row(&cells),
+                    row(&picture_cells(&longer, colors, settled)),
+                    "{colors:?}"
+                );
             }
         }
     }
+}
+
+#[test]
+fn dark_surfaces_stay_apart_without_colors() {
+    // Mirror and wall of the opening scene, on the left and on the right.
+    let dark = |i: usize| if i % 8 < 4 { [40, 44, 60] } else { [56, 70, 76] };
+    for colors in [Colors::Sixteen, Colors::Mono] {
+        let cells = picture_cells(&Raster::from_fn(8, 4, dark), colors, false);
+        assert_ne!(PictureCell::from(&cells.content[0]), PictureCell::from(&cells.content[7]));
+    }
+    let coverage = |raster: &Raster| {
+        let cells = picture_cells(raster, Colors::Mono, false);
+        [0, 7].map(|i| glyph_shading::coverage(PictureCell::from(&cells.content[i]).glyph))
+    };
+    let [mirror, wall] = coverage(&Raster::from_fn(8, 4, dark));
+    let [dense, sparse] = coverage(&Raster::from_fn(8, 4, dark).negative());
+    assert!(mirror < wall && dense >= sparse && dense > wall, "{mirror} {wall} {dense} {sparse}");
 }
 
 #[test]
