@@ -168,3 +168,16 @@ fn click_places_probe() {
     assert_eq!(desk.model.probe, None);
     assert!(desk.asked(|e| matches!(e, Effect::View(view) if view.probe.is_none())));
 }
+
+#[test]
+fn drag_over_a_number_steps_it() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Target::Material("mirror".into()));
+    let (rows, _) = desk.model.inspector_rows().unwrap();
+    desk.drag(Button::Left, [rows.x + 1, rows.y], [1, 0]);
+    assert_eq!(desk.text(), ROOM, "a click that slips");
+    desk.drag(Button::Left, [rows.x + 1, rows.y], [3, 0]);
+    assert_eq!(desk.scene().materials["mirror"].roughness, 0.06);
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM, "one step");
+}
