@@ -1,7 +1,8 @@
 //! Key hints in the last row of the screen, selected from the command table.
 
 use crate::dashboard::update::commands::{COMMANDS, Hint, HintLine};
-use crate::dashboard::{KeyContext, Model, Overlay};
+use crate::dashboard::{KeyContext, Model, Overlay, PanelLine};
+use zerkalo_scene::edit::Widget;
 
 /// Returns the state of `model` that selects the hints. Returns `None` while an exported image
 /// covers the hint line.
@@ -10,9 +11,15 @@ fn hint_line(model: &Model) -> Option<HintLine> {
         Some(Overlay::Pick(_) | Overlay::NoiseTargets(_) | Overlay::Question(_)) => HintLine::List,
         Some(Overlay::ViewerImage(_)) => return None,
         None | Some(Overlay::Form(_)) if model.field_list().filter.is_some() => HintLine::List,
-        Some(Overlay::Form(form)) if form.fields.editor.is_none() => HintLine::Form,
-        Some(Overlay::Form(_) | Overlay::Prompt(_)) => HintLine::Typing,
-        None if model.inspector.editor.is_some() => HintLine::Typing,
+        Some(Overlay::Prompt(_)) => HintLine::Typing,
+        None | Some(Overlay::Form(_)) if model.field_list().editor.is_some() => {
+            let lines = model.field_lines();
+            let field = lines.get(model.field_list().cursor).and_then(PanelLine::entry);
+            let is_number =
+                field.is_some_and(|f| matches!(f.property.widget, Widget::Numbers | Widget::Color));
+            if is_number { HintLine::Number } else { HintLine::Typing }
+        }
+        Some(Overlay::Form(_)) => HintLine::Form,
         None if model.watch.is_some() && model.context() != KeyContext::Probing => {
             HintLine::Watching
         }
@@ -50,7 +57,9 @@ mod tests {
                         HintLine::First => KeyContext::Picture,
                         HintLine::In(context) => *context,
                         HintLine::Watching => KeyContext::Outline,
-                        HintLine::List | HintLine::Form | HintLine::Typing => KeyContext::Overlay,
+                        HintLine::List | HintLine::Form | HintLine::Typing | HintLine::Number => {
+                            KeyContext::Overlay
+                        }
                     };
                     let has_key =
                         command.keys.iter().any(|(c, _)| context.chain().any(|other| other == *c));

@@ -63,7 +63,7 @@ pub struct OutlineEntry {
 }
 
 /// Line that shows the value of a property, or one number of this value.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct FieldLine {
     /// Part of the scene that has the property.
     pub subject: Target,
@@ -83,8 +83,9 @@ pub struct FieldLine {
 }
 
 /// Effect of Enter on a line of the inspector or of a form.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RowAct {
+    #[default]
     Edit,
     /// Accepts the form.
     Add,
@@ -93,19 +94,6 @@ pub enum RowAct {
 }
 
 impl FieldLine {
-    fn without_property(act: RowAct, label: String) -> Self {
-        Self {
-            subject: Target::Camera,
-            property: Property::default(),
-            component: None,
-            label,
-            value: String::new(),
-            swatch: None,
-            is_rare: false,
-            act,
-        }
-    }
-
     /// Returns the help on the line: `problem`, or a description and the valid values, with the
     /// default if the present value is another.
     pub fn help(&self, problem: Option<&str>) -> Vec<String> {
@@ -193,7 +181,8 @@ pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
         _ => false,
     };
     let what = form.title.strip_prefix("new ").unwrap_or(&form.title);
-    let add = FieldLine::without_property(RowAct::Add, format!("✓ Add {what}"));
+    let add =
+        FieldLine { act: RowAct::Add, label: format!("✓ Add {what}"), ..FieldLine::default() };
     let mut lines = vec![PanelLine::Entry(Box::new(add))];
     lines.extend(match has_new_material {
         true => inspector(&form.scene, &form.subject),
@@ -230,7 +219,7 @@ fn visible(lines: Vec<PanelLine>, list: &FieldList) -> Vec<PanelLine> {
     let is_rare = |line: &&PanelLine| line.entry().is_some_and(|field| field.is_rare);
     let rare = lines.iter().filter(is_rare).count();
     let label = if list.unfolded { "▾ fewer".to_string() } else { format!("▸ {rare} more") };
-    let fold = FieldLine::without_property(RowAct::Fold, label);
+    let fold = FieldLine { act: RowAct::Fold, label, ..FieldLine::default() };
     let mut lines = lines;
     lines.retain(|line| list.unfolded || !is_rare(&line));
     lines.extend((rare > 0).then(|| PanelLine::Entry(Box::new(fold))));

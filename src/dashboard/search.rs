@@ -6,7 +6,7 @@ use crate::dashboard::PickEntry;
 const OPPOSITES: [&str; 4] = ["cancel", "close", "leave", "reset"];
 
 /// Returns the words of `text` in lower case.
-fn words(text: &str) -> Vec<String> {
+pub fn words(text: &str) -> Vec<String> {
     let words = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
     words.map(str::to_lowercase).collect()
 }
@@ -17,15 +17,14 @@ pub fn has_words(text: &str, wanted: &str) -> bool {
     words(wanted).iter().all(|word| own.iter().any(|own| own.starts_with(word)))
 }
 
-/// Returns the rank of `entry` among the matches of `wanted`; the smallest comes first. Returns
+/// Returns the rank of `entry` among the matches of the words `wanted`, the smallest first. Returns
 /// `None` if the entry does not match: each word must begin or be in a word of the name, begin one
 /// of the other words, or have its letters in the name, in this order.
-pub fn rank(wanted: &str, entry: &PickEntry) -> Option<usize> {
-    let (wanted, name) = (words(wanted), words(&entry.name));
+pub fn rank(wanted: &[String], entry: &PickEntry) -> Option<usize> {
+    let name = words(&entry.name);
     if wanted == name {
         return Some(0);
     }
-    let also = words(&format!("{} {}", entry.also, entry.note));
     let letters = name.concat();
     let rank_of = |word: &String| {
         let begins = |own: &String| own.starts_with(word);
@@ -36,7 +35,7 @@ pub fn rank(wanted: &str, entry: &PickEntry) -> Option<usize> {
         match word {
             _ if name.first().is_some_and(begins) => Some(1),
             _ if name.iter().any(begins) => Some(2),
-            _ if also.iter().any(begins) => Some(3),
+            _ if [&entry.also, &entry.note].iter().any(|text| has_words(text, word)) => Some(3),
             _ if letters.contains(word) => Some(8),
             _ if has_letters() => Some(16),
             _ => None,
@@ -63,6 +62,7 @@ mod tests {
     fn word_starts_precede_and_opposites_follow() {
         let write = entry("write a PNG", "export image");
         let cancel = entry("cancel the running export", "");
+        let rank = |text: &str, entry| rank(&words(text), entry);
         let place = |text: &str, entry| rank(text, entry).unwrap_or(usize::MAX);
         let before = |text: &str| place(text, &write) < place(text, &cancel);
         assert!(before("export") && before("exp") && !before("running"));

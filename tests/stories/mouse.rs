@@ -207,3 +207,16 @@ fn mark_picks_and_moves_its_light() {
     desk.send(Message::Tick);
     assert!(desk.model.light_marks(&layout).is_empty(), "marks fade");
 }
+
+#[test]
+fn drag_over_a_number_steps_it() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Target::Material("mirror".into()));
+    let (rows, _) = desk.model.inspector_rows().unwrap();
+    desk.drag(Button::Left, [rows.x + 1, rows.y], [1, 0]);
+    assert_eq!(desk.text(), ROOM, "a click that slips");
+    desk.drag(Button::Left, [rows.x + 1, rows.y], [3, 0]);
+    assert_eq!(desk.scene().materials["mirror"].roughness, 0.06);
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM, "one step");
+}

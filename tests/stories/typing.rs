@@ -30,16 +30,24 @@ fn unchanged(desk: &mut Desk, place: &str, keys: &[&str]) {
 fn stray_keys_change_nothing_on_any_row() {
     let room = Desk::new(ROOM);
     let parts = zerkalo_scene::edit::outline(room.scene());
+    let mut seen = HashSet::new();
     for (_, subject) in parts {
+        let mut desk = Desk::new(ROOM);
+        desk.select(subject.clone());
+        desk.keys("Tab");
+        unchanged(&mut desk, "the outline", &STRAY);
         for line in 0..usize::MAX {
             let mut desk = Desk::new(ROOM);
             desk.select(subject.clone());
-            desk.keys("Tab");
-            unchanged(&mut desk, "the outline", &STRAY);
-            desk.select(subject.clone());
-            desk.keys("Enter");
+            desk.keys("Tab Enter");
             if line >= desk.model.field_lines().len() {
                 break;
+            }
+            // One row of each kind.
+            let lines = desk.model.field_lines();
+            let field = lines[line].entry();
+            if !seen.insert(field.map(|f| format!("{:?} {:?}", f.act, f.property.widget))) {
+                continue;
             }
             desk.model.inspector.cursor = line;
             unchanged(&mut desk, &format!("line {line} of {subject:?}"), &STRAY);
@@ -172,4 +180,16 @@ fn colours_and_calculations_are_typed_into_fields() {
     desk.keys("/ `refl` Enter `.25` Enter Up *");
     desk.keys("`2` Enter");
     assert_eq!(desk.scene().materials["red"].reflection, 0.5);
+}
+
+#[test]
+fn scene_is_saved_from_every_widget() {
+    for keys in ["", "Tab", "Enter", "Enter Down Enter", "a", "a Enter", "a Enter `rad`", ":", "N"]
+    {
+        let mut desk = Desk::new(ROOM);
+        desk.select(Target::Object(1));
+        desk.keys(&format!("] {keys} Ctrl-s"));
+        assert!(!desk.model.is_unsaved(), "{keys}");
+        assert_eq!(desk.scene().objects.len(), if keys.starts_with("a E") { 4 } else { 3 });
+    }
 }

@@ -19,6 +19,8 @@ pub enum HintLine {
     List,
     Form,
     Typing,
+    /// A number or colour is being typed.
+    Number,
     Watching,
 }
 
@@ -186,19 +188,20 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::In(Moving), H::In(Rotating), H::In(Flying), H::In(Probing)], 9, "Esc", "done"),
         hint(&[H::In(Outline), H::In(Inspector)], 9, "Esc", "picture"),
         hint(&[H::List, H::Form], 9, "Esc", "cancel"),
-        hint(&[H::Typing], 9, "Esc", "leave as it was"),
+        hint(&[H::Typing, H::Number], 9, "Esc", "leave as it was"),
     ]),
     command("panels", "inspect, edit, confirm, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).hints(&[
         hint(&[H::In(Outline)], 2, "Enter", "inspect"),
         hint(&[H::In(Inspector)], 4, "Enter 0-9", "type"),
         hint(&[H::List], 2, "Enter", "take"),
         hint(&[H::Form], 3, "Enter", "edit"),
-        hint(&[H::Typing], 1, "Enter", "confirm"),
-        hint(&[H::Typing], 2, "*2 /2 +.1 -=.1", "change a number"),
+        hint(&[H::Typing, H::Number], 1, "Enter", "confirm"),
+        hint(&[H::Number], 2, "*2 /2 +.1 -=.1", "change it"),
     ]),
     command("panels", "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).available(always).hints(&[
         hint(&[H::In(Outline)], 1, "Up Down", "select"),
         hint(&[H::In(Inspector), H::Form], 1, "Up Down", "field"),
+        hint(&[H::Form], 5, "letters /", "find"),
         hint(&[H::List], 1, "Up Down", "choose"),
         hint(&[H::Watching], 2, "Up Down", "select"),
     ]),
@@ -212,7 +215,7 @@ pub static COMMANDS: &[Command] = &[
     command("panels", "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::In(Inspector)], 3, "Shift", "fine")]),
     command("panels", "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
     command("panels", "reset the field to its default", &[(Inspector, "Backspace")], |c| c.fill_field("")).hints(&[hint(&[H::In(Inspector)], 6, "Backspace", "default")]),
-    command("panels", "find a field or a part of the scene", &[(Anywhere, "/")], |c| c.find()).also("search").hints(&[hint(&[H::In(Outline), H::In(Inspector)], 5, "/", "find"), hint(&[H::Form], 5, "letters /", "find")]),
+    command("panels", "find a field or a part of the scene", &[(Anywhere, "/")], |c| c.find()).also("search").hints(&[hint(&[H::In(Outline), H::In(Inspector)], 5, "/", "find")]),
     command("panels", "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).available(viewing),
 
     command("file", "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::In(Picture)], 9, "u", "undo")]),

@@ -59,6 +59,10 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn save(&mut self) {
+        let asks = self.model.file.path.is_none() || self.model.file.broken.is_some();
+        if asks && self.in_form() {
+            return self.refuse("First Home Enter adds, or Esc cancels; then Ctrl-s saves");
+        }
         if self.model.file.path.is_none() {
             self.ask_path();
         } else if self.model.file.broken.is_some() {
@@ -230,6 +234,7 @@ impl UpdateContext<'_> {
                 let title = self.model.selection.title(self.model.history.scene());
                 self.model.overlay = None;
                 self.end_mode();
+                self.model.marked.clear();
                 self.model.file.saved = Arc::clone(&scene);
                 self.model.file.broken = None;
                 self.model.file.unreadable = false;

@@ -23,11 +23,13 @@ impl UpdateContext<'_> {
         self.model.mode = mode;
     }
 
-    /// Leaves the first of these states that is active: overlay, text editor, mode, focus on
-    /// another panel, zoom, full screen, comparison.
+    /// Leaves the first of these states that is active: filter, overlay, text editor, mode,
+    /// marks, focus on another panel, zoom, full screen, comparison.
     pub(super) fn leave(&mut self) {
         if self.end_filter() {
-        } else if self.model.overlay.is_some() {
+            return;
+        }
+        if self.model.overlay.is_some() {
             self.close_overlay();
         } else if self.model.inspector.editor.is_some() {
             self.model.inspector.editor = None;

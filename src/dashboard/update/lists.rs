@@ -1,14 +1,13 @@
 //! Commands that move the cursor and open the entry under it, in panels and overlays.
 
 use crate::dashboard::panel_lines::{outline, outline_position, walked};
-use crate::dashboard::search::rank;
+use crate::dashboard::search::{rank, words};
 use crate::dashboard::{
-    Answer, Editor, Focus, KeyContext, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
+    Answer, Editor, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
     UpdateContext,
 };
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
-use zerkalo_scene::edit::{Section, Target, outline as subjects};
 
 impl UpdateContext<'_> {
     /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines.
@@ -131,26 +130,6 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Filters the properties in the inspector, or elsewhere lists the parts of the scene.
-    pub(super) fn find(&mut self) {
-        if self.model.context() == KeyContext::Inspector {
-            return self.open_filter("");
-        }
-        let parts = subjects(self.scene()).into_iter();
-        let entry = |(section, subject): (Section, Target)| {
-            PickEntry::new(subject.title(self.scene()), section.title())
-        };
-        let parts: Vec<_> = parts.map(entry).collect();
-        self.open_pick("find a part of the scene", parts, 0, |c, title| c.select_titled(title));
-    }
-
-    fn select_titled(&mut self, title: &str) {
-        let mut subjects = subjects(self.scene()).into_iter().map(|(_, subject)| subject);
-        if let Some(found) = subjects.find(|subject| subject.title(self.scene()) == title) {
-            self.select(found);
-        }
-    }
-
     /// Updates the open list to the entries that match the search text, best match first.
     pub(super) fn search(&mut self) {
         if self.model.field_list().filter.is_some() {
@@ -163,9 +142,10 @@ impl UpdateContext<'_> {
             Some(field) => field.split(' ').next().unwrap_or_default(),
             None => text,
         };
+        let wanted = words(wanted);
         let ranked = pick.entries.iter().enumerate();
         let mut ranked: Vec<_> =
-            ranked.filter_map(|(i, entry)| Some((rank(wanted, entry)?, i))).collect();
+            ranked.filter_map(|(i, entry)| Some((rank(&wanted, entry)?, i))).collect();
         ranked.sort_unstable();
         pick.found = ranked.into_iter().map(|(_, i)| i).collect();
         pick.at = ListCursor::default();
@@ -173,7 +153,11 @@ impl UpdateContext<'_> {
 
     pub(super) fn ask(&mut self, text: String, answers: &[Answer]) {
         let question = Question { text, answers: answers.to_vec(), at: ListCursor::default() };
+        let previews = self.in_form();
         self.model.overlay = Some(Overlay::Question(question));
+        if previews {
+            self.show();
+        }
     }
 
     /// Closes the open question and carries out the answer with index `at`.

@@ -193,7 +193,9 @@ impl UpdateContext<'_> {
         let [column, row] = drag.last;
         let right = f64::from(mouse.column) - f64::from(column);
         let down = 2.0 * (f64::from(mouse.row) - f64::from(row));
-        if (right, down) == (0.0, 0.0) {
+        // A click on a number that slips by a column changes nothing.
+        let slips = drag.on_number && !drag.moved && right.abs() < 2.0;
+        if slips || (right, down) == (0.0, 0.0) {
             return;
         }
         drag.last = [mouse.column, mouse.row];

@@ -32,7 +32,7 @@ const SYNONYMS: &[(&str, &str)] = &[
     ("center", "position place"),
 ];
 
-/// What the palette does with an entry.
+/// Effect of an entry of the palette.
 enum Choice {
     Run(&'static Command),
     /// Jumps to a property.
@@ -93,6 +93,17 @@ impl UpdateContext<'_> {
         self.open_pick(title, entries, 0, |c, label| c.choose(label));
     }
 
+    /// Filters the properties in the inspector, or elsewhere lists the parts of the scene.
+    pub(super) fn find(&mut self) {
+        if self.model.context() == KeyContext::Inspector {
+            return self.open_filter("");
+        }
+        let parts = self.palette().into_iter();
+        let parts = parts.filter(|(_, choice)| matches!(choice, Choice::Select(_)));
+        let parts: Vec<_> = parts.map(|(entry, _)| entry).collect();
+        self.open_pick("find a part of the scene", parts, 0, |c, name| c.choose(name));
+    }
+
     fn palette(&self) -> Vec<(PickEntry, Choice)> {
         let watching = self.model.watch.is_some();
         let listed = COMMANDS.iter().filter(|command| command.is_listed(self.model));
@@ -110,7 +121,7 @@ impl UpdateContext<'_> {
                 let also = SYNONYMS.iter().find(|(key, _)| Some(*key) == last);
                 let also = also.map_or("", |(_, words)| words).to_string();
                 let entry = PickEntry { also, ..PickEntry::new(name, &field.property.value) };
-                list.push((entry, Choice::Edit(field)));
+                list.push((entry, Choice::Edit(Box::new(field))));
             }
         }
         for (section, subject) in subjects(scene) {
@@ -122,7 +133,7 @@ impl UpdateContext<'_> {
 
     /// Returns the properties of the selection and its material, of the mirror, and of camera, film
     /// and integrator.
-    fn reachable_fields(&self) -> Vec<Box<FieldLine>> {
+    fn reachable_fields(&self) -> Vec<FieldLine> {
         let scene = self.scene();
         let selection = &self.model.selection;
         let mirror = edit::mirror(scene, Some(selection));
@@ -132,7 +143,7 @@ impl UpdateContext<'_> {
         let lines = subjects.into_iter().flatten().chain(settings);
         let lines = lines.flat_map(|subject| inspector(scene, &subject));
         lines
-            .filter_map(|line| if let PanelLine::Entry(field) = line { Some(field) } else { None })
+            .filter_map(|line| if let PanelLine::Entry(field) = line { Some(*field) } else { None })
             .collect()
     }
 
@@ -213,7 +224,7 @@ impl UpdateContext<'_> {
         };
         let found = fields.iter().find(|field| number(field) || whole(field));
         let field = found.ok_or_else(|| format!("There is no field \"{name}\" here."))?;
-        let mut field = FieldLine::clone(field);
+        let mut field = field.clone();
         if !number(&field) {
             (field.component, field.value) = (None, field.property.value.clone());
         }

@@ -103,10 +103,6 @@ fn draw_field(
     if let Some(editor) = chosen.and_then(|state| state.editor.as_ref()) {
         return typed(editor, &mut to);
     }
-    let swatch = field.swatch.and_then(|color| theme.swatch(Display::default().to_8()(color)));
-    if let Some(style) = swatch {
-        to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
-    }
     let needed = columns(&brief(&field.value)) + columns(field.property.unit) + BAR + 4;
     if let Some([full, rest]) = bar(field).filter(|_| to.left() >= needed) {
         let color = match (field.property.widget, field.component) {
@@ -115,6 +111,10 @@ fn draw_field(
         };
         let color = if chosen.is_some() { name } else { color.unwrap_or(theme.accent()) };
         to.put_right(" ", 0, name).put_right(&rest, 0, name).put_right(&full, 0, color);
+    }
+    let swatch = field.swatch.and_then(|color| theme.swatch(Display::default().to_8()(color)));
+    if let Some(style) = swatch {
+        to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
     }
     let words = matches!(field.property.widget, Widget::Choice | Widget::Kind | Widget::Switch);
     match field.value.as_str() {

@@ -44,9 +44,11 @@ impl Color {
     /// value such as `hsv 30 1 1`, or the colour of a black body at a temperature, such as `2700 K`.
     pub fn typed(text: &str) -> Option<Self> {
         let text = text.trim().to_lowercase();
-        if let Some(digits) = text.strip_prefix('#').filter(|digits| digits.chars().count() == 3) {
-            let doubled: String = digits.chars().flat_map(|c| [c, c]).collect();
-            return Self::from_hex(&format!("#{doubled}"));
+        if let Some(digits) = text.strip_prefix('#') {
+            let times = if digits.chars().count() == 3 { 2 } else { 1 };
+            let digits: String =
+                digits.chars().flat_map(|c| [c, c].into_iter().take(times)).collect();
+            return Self::from_hex(&format!("#{digits}"));
         }
         let mut words = NAMED.split(' ');
         if let Some(code) = words.by_ref().find(|word| *word == text).and(words.next()) {
@@ -56,7 +58,7 @@ impl Color {
             let kelvin: f64 = kelvin.trim().parse().ok()?;
             return (1000.0..=40_000.0).contains(&kelvin).then(|| Self::black_body(kelvin));
         }
-        let Some(hsv) = text.strip_prefix("hsv") else { return Self::from_hex(&text) };
+        let hsv = text.strip_prefix("hsv")?;
         let parts = hsv.split(|c: char| " ,()".contains(c)).filter(|part| !part.is_empty());
         let parts: Option<Vec<f64>> = parts.map(|part| part.parse().ok()).collect();
         let [hue, saturation, value] = parts?.try_into().ok()?;
@@ -73,7 +75,7 @@ impl Color {
     /// the largest channel. Channels that sRGB cannot represent are 0.
     fn black_body(kelvin: f64) -> Self {
         // Chromaticity of the Planckian locus: Kim et al., US patent 7024034.
-        let t = 1e3 / kelvin.max(1667.0).min(25_000.0);
+        let t = 1e3 / kelvin.clamp(1667.0, 25_000.0);
         let cubic = |[a, b, c, d]: [f64; 4], t: f64| ((a * t + b) * t + c) * t + d;
         let x = match kelvin {
             ..4000.0 => cubic([-0.266_123_9, -0.234_358_9, 0.877_695_6, 0.179_910], t),
@@ -133,7 +135,7 @@ mod tests {
     #[test]
     fn typed_colours_have_names_hues_and_temperatures() {
         let typed = |text| Color::typed(text).unwrap().0;
-        assert_eq!(typed("#f80"), typed("#ff8800"));
+        assert_eq!([typed("#f80"), typed("#FFF")], [typed("#ff8800"), [1.0; 3]]);
         assert_eq!([typed("Red"), typed("hsv 0 1 1")], [[1.0, 0.0, 0.0]; 2]);
         assert_eq!(typed("hsv(240, 1, 1)"), typed("blue"));
         let [red, green, blue] = typed("2700 K");
