@@ -74,7 +74,8 @@ fn tiles_show_the_exported_picture() {
     };
     let until = Instant::now() + Duration::from_secs(60);
     while !is_shown(&terminal) {
-        assert!(Instant::now() < until, "the tiles never show the file");
+        let count = || String::from_utf8_lossy(&terminal.bytes()).matches("a=T,").count();
+        assert!(Instant::now() < until, "{} tiles do not show the file", count());
         std::thread::sleep(Duration::from_millis(100));
     }
     // A move of the camera removes the tiles, and a signal those that have come back.
