@@ -28,7 +28,8 @@ fn assembled(bytes: &str, size: [usize; 2]) -> Option<Vec<u8>> {
             place = [column.parse().ok()?, row.parse().ok()?];
             letters.clear();
         }
-        letters += data.split('\x1b').next()?;
+        // The last piece may still be on its way.
+        letters += data.split_once('\x1b')?.0;
         if keys.ends_with("m=0") && !letters.is_empty() {
             let png = STANDARD.decode(&letters).ok()?;
             tiles.insert(place, Picture::of_png(&png));

@@ -57,6 +57,12 @@ pub struct Detail {
 }
 
 impl Detail {
+    /// Returns `true` if every pixel of `film` has a sample.
+    pub fn is_possible(film: &Film) -> bool {
+        let tiles = (0..film.tile_count()).map(|index| film.tile(index));
+        tiles.into_iter().all(|tile| tile.is_some_and(|t| t.counts != [0; 2] || t.lattice_px == 1))
+    }
+
     /// Displays `window` of `film`, whose pixels must all have samples, in `size` (columns, rows).
     pub fn of_film(
         film: &Film,
