@@ -36,9 +36,9 @@ fn zoom_shows_a_window_of_the_film() {
     assert_eq!(moved, [320 - size[0] / 2 - 4, 240 - size[1] / 2 + 4]);
     desk.keys("Left Up");
     assert!(window(&desk).origin[0] < moved[0] && window(&desk).origin[1] < moved[1]);
-    (0..90).for_each(|_| {
+    for _ in 0..90 {
         desk.keys("Right Down");
-    });
+    }
     assert_eq!(window(&desk).origin, [640 - size[0], 480 - size[1]], "as far as the film reaches");
     // The window follows the probe.
     desk.keys("i");

@@ -134,9 +134,16 @@ impl Dashboard {
                 self.frames.flow.on_ack(at.saturating_duration_since(self.began));
                 return;
             }
-            Event::Reply(reply @ (Reply::Graphics(true) | Reply::Version(_))) => {
-                // A terminal behind a multiplexer may reply only after the capability query has
-                // ended.
+            Event::Reply(
+                reply @ (Reply::Graphics(true)
+                | Reply::Version(_)
+                | Reply::CellSize(_)
+                | Reply::Attributes(_)
+                | Reply::SixelColors(_)
+                | Reply::SixelSize(_)),
+            ) => {
+                // A terminal behind a multiplexer or a slow line may reply only after the capability
+                // query has ended.
                 self.frames.terminal.learn(&reply);
                 let terminal = Box::new(self.frames.terminal.clone());
                 self.dispatch(Message::Terminal(terminal));

@@ -1,8 +1,8 @@
 //! Windows of the film, and their pixels as displayed.
 
 use crate::film::TILE;
-use crate::film::box_filter::box_means;
 use crate::film::display::Display;
+use crate::film::downsample::IncrementalDownsample;
 use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::store::Film;
 use rayon::prelude::*;
@@ -57,6 +57,12 @@ pub struct Detail {
 }
 
 impl Detail {
+    /// Returns `true` if every pixel of `film` has a sample.
+    pub fn is_possible(film: &Film) -> bool {
+        let tiles = (0..film.tile_count()).map(|index| film.tile(index));
+        tiles.into_iter().all(|tile| tile.is_some_and(|t| t.counts != [0; 2] || t.lattice_px == 1))
+    }
+
     /// Displays `window` of `film`, whose pixels must all have samples, in `size` (columns, rows).
     pub fn of_film(
         film: &Film,
@@ -77,14 +83,15 @@ impl Detail {
             })
         };
         let to_8 = display.to_8();
-        let pixels = pool.install(|| {
+        let pixels = if size == window.size {
             let all = (0..width * height).into_par_iter().with_min_len(512);
-            if size == window.size {
-                return all.map(|i| to_8(radiance(i))).collect();
-            }
-            let linear: Vec<_> = all.map(radiance).collect();
-            box_means(window.size, size, |i| linear[i]).into_iter().map(&to_8).collect()
-        });
+            pool.install(|| all.map(|i| to_8(radiance(i))).collect())
+        } else {
+            let mut downsample = IncrementalDownsample::new(film, window, size[0], size[1]);
+            downsample.update(film, Some(pool));
+            let means = downsample.thumbnail().mixed(weights);
+            means.into_iter().map(|mean| to_8(mean.map(f64::from))).collect()
+        };
         let weights = weights.clone();
         Self { window, size, pixels, display: *display, weights, spp: 0.0, generation: 0 }
     }

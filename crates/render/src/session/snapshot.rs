@@ -101,7 +101,7 @@ impl Snapshot {
         }
         let probe = |pixel| PixelProbe::of_film(film, pixel, &self.weights, display);
         self.probe = context.view.probe.and_then(probe);
-        let is_complete = self.report.spp.min > 0;
+        let is_complete = context.view.detail.is_some() && Detail::is_possible(film);
         self.detail = context.view.detail.filter(|_| is_complete).map(|(window, size)| {
             let is_tracing = matches!(self.report.state, State::Tracing);
             let growth = if is_tracing { DETAIL_GROWTH } else { 1.0 };
