@@ -1,8 +1,8 @@
 //! Model: the complete state of the dashboard, from which the screen is drawn.
 
 use crate::dashboard::{
-    Convergence, DisplayChannel, Editor, Focus, Format, KeyContext, ListCursor, OrphanedEdits,
-    Overlay, SceneSource,
+    Convergence, DisplayChannel, Editor, Focus, KeyContext, ListCursor, OrphanedEdits, Overlay,
+    SceneSource,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -179,8 +179,8 @@ pub struct Model {
     pub quit_when_saved: bool,
     /// Scene that opens as soon as the unsaved edits are saved or discarded.
     pub next_scene: Option<SceneSource>,
-    /// Format of the picture that is written as soon as the render ends.
-    pub export_when_done: Option<Format>,
+    /// `true` if a PNG is written as soon as the render ends.
+    pub export_when_done: bool,
     /// Unsaved edits of a crashed run, until they are recovered or discarded.
     pub orphaned_edits: Option<OrphanedEdits>,
     /// Scene of the last autosave; `None` if there were no unsaved edits at that time.

@@ -220,6 +220,7 @@ pub static COMMANDS: &[Command] = &[
     command("file", "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).available(always).hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
 
     command("picture", "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).available(viewing).hints(&[hint(&[H::In(Picture), H::Watching], 10, "p", "PNG")]),
+    command("picture", "write a PNG when converged", &[(Anywhere, "Alt-p")], |c| c.export_when_done()),
     command("picture", "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).available(viewing).hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
     command("picture", "view the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).available(viewing),
     command("picture", "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()).available(viewing),

@@ -62,10 +62,8 @@ impl Preset {
 
     /// Returns the model of the reflectance; `None` for the default.
     pub(super) fn fresnel(self) -> Option<Fresnel> {
-        match self {
-            Self::Glass | Self::FrostedGlass | Self::Water => Some(Fresnel::Dielectric),
-            _ => self.f0().map(|_| Fresnel::Schlick),
-        }
+        let is_clear = matches!(self, Self::Glass | Self::FrostedGlass | Self::Water);
+        if is_clear { Some(Fresnel::Dielectric) } else { self.f0().map(|_| Fresnel::Schlick) }
     }
 
     /// Returns the material without any override.
@@ -89,8 +87,8 @@ impl Preset {
             ..plain.clone()
         };
         match self {
-            Self::Gold | Self::Silver | Self::Copper | Self::Brass => metal(0.06),
-            Self::Chrome => metal(0.02),
+            Self::Gold | Self::Silver | Self::Copper | Self::Brass => metal(0.03),
+            Self::Chrome => metal(0.01),
             Self::Iron => metal(0.5),
             Self::BrushedMetal => metal(0.4),
             Self::Glass => clear(1.517),
