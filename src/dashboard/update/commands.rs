@@ -170,7 +170,7 @@ pub static COMMANDS: &[Command] = &[
     command("objects", "rotate right, fine", &[(Rotating, "Shift-Right")], |c| c.rotate_selection(1.0)),
     command("objects", "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
     command("objects", "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
-    command("objects", "make the selection gold, glass, …", &[(Anywhere, "S")], |c| c.pick_preset()).hints(&[hint(&[H::In(Outline)], 8, "S", "gold, glass …")]),
+    command("objects", "make the selection gold, glass, …", &[(Anywhere, "S")], |c| c.pick_preset()),
     command("objects", "remove unused materials", &[], |c| c.purge_materials()),
 
     command("panels", "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).available(viewing).hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),

@@ -1,10 +1,9 @@
 //! Commands on rendering, exports and the colour depth of the terminal.
 
 use crate::dashboard::model::Colors;
-use crate::dashboard::text::durations;
 use crate::dashboard::update::cycled;
 use crate::dashboard::update::prompt::stop_text;
-use crate::dashboard::{Answer, Effect, Format, ListCursor, Overlay, UpdateContext};
+use crate::dashboard::{Effect, Format, ListCursor, Overlay, UpdateContext};
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::{QUALITIES, State};

@@ -146,6 +146,12 @@ mod tests {
             assert_eq!(document.text(), format!("[materials.a] # mine\n{expected}"), "{key}");
             assert_eq!(Scene::parse(document.text(), "a.toml").unwrap(), edited, "{key}");
         }
+        // A default that the file does not name can override a preset.
+        let mut plain = Document::parse("[materials.a]\nambient = 0.5\n".into(), "a.toml").unwrap();
+        let gold = set(plain.scene(), &a, "preset", "gold").unwrap().scene;
+        let cone = set(&gold, &a, "lobe", "cone").unwrap().scene;
+        plain.apply(&cone);
+        assert_eq!(plain.text(), "[materials.a]\npreset = \"gold\"\nlobe = \"cone\"\n");
         // Without its preset a material keeps all values.
         let free = set(&scene, &a, "preset", "").unwrap().scene;
         document.apply(&free);

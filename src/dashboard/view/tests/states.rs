@@ -233,7 +233,7 @@ pub const STATES: &[Named] = &[
         m.display.exposure_ev = 0.75;
         m.display.tone = zerkalo_render::film::Tone::Neutral;
         let size = [1920, 1080];
-        m.export = Some(RunningExport { size, progress: 0.43 });
+        m.export = Some(RunningExport { size, progress: 0.43, left: None });
     }),
     ("outline", |m| {
         m.focus = Focus::Outline;
