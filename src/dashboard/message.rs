@@ -198,6 +198,8 @@ pub enum Effect {
         display: Display,
         stop: Stop,
     },
+    /// Write the picture of [`Effect::ExportSized`] as it is.
+    FinishExport,
     /// Cancel the render of [`Effect::ExportSized`]. No image is written then, unless the write has
     /// begun.
     CancelExport,

@@ -4,8 +4,8 @@ use crate::dashboard::graphics::Graphics;
 use crate::dashboard::layout::Zoom;
 use crate::dashboard::loupe::Loupe;
 use crate::dashboard::{
-    Convergence, DisplayChannel, Editor, Focus, Format, KeyContext, ListCursor, OrphanedEdits,
-    Overlay, SceneSource,
+    Convergence, DisplayChannel, Editor, Focus, KeyContext, ListCursor, OrphanedEdits, Overlay,
+    SceneSource,
 };
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -232,8 +232,8 @@ pub struct Model {
     pub quit_when_saved: bool,
     /// Scene that opens as soon as the unsaved edits are saved or discarded.
     pub next_scene: Option<SceneSource>,
-    /// Format of the picture that is written as soon as the render ends.
-    pub export_when_done: Option<Format>,
+    /// `true` if a PNG is written as soon as the render ends.
+    pub export_when_done: bool,
     /// Unsaved edits of a crashed run, until they are recovered or discarded.
     pub orphaned_edits: Option<OrphanedEdits>,
     /// Scene of the last autosave; `None` if there were no unsaved edits at that time.

@@ -172,7 +172,7 @@ fn unsaved_edits_without_file_are_kept_in_state_folder() {
     let mut terminal = open(&[PROGRAM]);
     wait_for_picture(&terminal);
     terminal.send("]");
-    terminal.wait_for_text("lamp-and-mirror.toml ●");
+    terminal.wait_for_text("lamp-and-mirror (no file) ●");
     signal("HUP", terminal.process_id());
     assert_eq!(terminal.end().0, 129);
     let kept: Vec<_> = fs::read_dir(state.join("zerkalo")).unwrap().collect();

@@ -324,6 +324,9 @@ fn picture_stories() -> Vec<Story> {
             d.asked(|e| *e == Effect::Export(Format::Png))
                 && d.notice().contains("room-1.png  64x48  16 spp  noise 2.50")
         }),
+        story("write a PNG when converged", "Alt-p", |_, d| {
+            d.model.export_when_done && d.notice().contains("when the picture has converged")
+        }),
         story("write an EXR", "P", |_, d| d.asked(|e| *e == Effect::Export(Format::Exr))),
         story("render at another size", "Ctrl-e Ctrl-u `320x240 exr` Enter", |_, d| {
             d.asked(|e| matches!(e, Effect::ExportSized { scene, format: Format::Exr, .. } if scene.film.size == [320, 240])) && d.scene().film.size == [64, 48]

@@ -239,7 +239,10 @@ fn other_exports_do_not_end_a_render_at_another_size() {
     desk.keys("Ctrl-e Ctrl-u `64x48 png` Enter p");
     desk.send(Message::Exported(Err("the disk is full".into())));
     desk.send(Message::ExportProgress(Some((0.5, None))));
-    assert!(desk.model.export.is_some_and(|export| export.progress == 0.5));
+    desk.send(Message::ExportProgress(Some((0.4, None))));
+    assert!(desk.model.export.is_some_and(|export| export.progress == 0.5), "never backwards");
+    desk.keys("Ctrl-e `n`");
+    assert!(desk.asked(|e| *e == Effect::FinishExport));
     desk.send(Message::ExportProgress(None));
     assert!(desk.model.export.is_none());
 }

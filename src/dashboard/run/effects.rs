@@ -115,6 +115,9 @@ impl EffectRunner {
             Effect::ExportSized { scene, format, display, stop } => {
                 self.export_sized(scene, format, display, stop);
             }
+            Effect::FinishExport => {
+                self.edit(|editing| editing.resized.iter().for_each(ResizedExport::finish));
+            }
             Effect::CancelExport => {
                 self.edit(|editing| editing.resized.iter().for_each(ResizedExport::cancel));
             }

@@ -179,7 +179,7 @@ pub static COMMANDS: &[Command] = &[
     command("objects", "rotate by a typed angle", &[(Rotating, "0 1 2 3 4 5 6 7 8 9 - .")], |c| c.ask_angle()).hints(&[hint(&[H::In(Rotating)], 3, "0-9", "type degrees")]),
     command("objects", "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
     command("objects", "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
-    command("objects", "make the selection gold, glass, …", &[(Anywhere, "S")], |c| c.pick_preset()).hints(&[hint(&[H::In(Outline)], 8, "S", "gold, glass …")]),
+    command("objects", "make the selection gold, glass, …", &[(Anywhere, "S")], |c| c.pick_preset()),
     command("objects", "remove unused materials", &[], |c| c.purge_materials()),
 
     command("panels", "next panel, or complete, or next group of fields", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).available(viewing).hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
@@ -232,6 +232,7 @@ pub static COMMANDS: &[Command] = &[
     command("file", "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).available(always).hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
 
     command("picture", "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).also("export image render").available(viewing).hints(&[hint(&[H::In(Picture), H::Watching], 10, "p", "PNG")]),
+    command("picture", "write a PNG when converged", &[(Anywhere, "Alt-p")], |c| c.export_when_done()),
     command("picture", "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).also("export image render").available(viewing).hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
     command("picture", "view the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).also("image show").available(viewing),
     command("picture", "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()).available(viewing),

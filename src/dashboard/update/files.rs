@@ -172,7 +172,7 @@ impl UpdateContext<'_> {
         let file = &mut self.model.file;
         (file.name, file.path, file.is_new) = (name, path, is_new);
         self.model.pinned = None;
-        self.model.export_when_done = None;
+        self.model.export_when_done = false;
         self.model.orphaned_edits = None;
         self.model.selection = Target::Camera;
         let verb = if is_new { "new scene" } else { "opened" };
@@ -279,7 +279,9 @@ impl UpdateContext<'_> {
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
             Ok(Exported { path, description, advice, is_image }) => {
-                let text = format!("{}  {description}  ·  {advice}", path.display());
+                let later =
+                    if is_image && self.improves() { "  ·  Alt-p: when converged" } else { "" };
+                let text = format!("{}  {description}{later}  ·  {advice}", path.display());
                 if is_image {
                     self.model.last_export = Some(path);
                 }

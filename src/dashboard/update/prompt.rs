@@ -2,7 +2,7 @@
 
 use crate::dashboard::model::RunningExport;
 use crate::dashboard::update::Coalesce;
-use crate::dashboard::{Editor, Effect, Format, Overlay, Prompt, UpdateContext};
+use crate::dashboard::{Answer, Editor, Effect, Format, Overlay, Prompt, UpdateContext};
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
@@ -106,8 +106,11 @@ impl UpdateContext<'_> {
     pub(super) fn ask_export_size(&mut self) {
         if let Some(export) = &self.model.export {
             let [width, height] = export.size;
-            self.refuse(&format!("{width}x{height} is being rendered · Ctrl-x cancels it"));
-            return;
+            let percent = 100.0 * export.progress;
+            let text = format!("{width}x{height} is being rendered: {percent:.0} %.");
+            let finish: Answer = ('n', "write it now", |c| c.emit(Effect::FinishExport));
+            let cancel: Answer = ('x', "cancel it", |c| c.cancel_export());
+            return self.ask(text, &[finish, cancel, ('l', "let it go on", |c| c.decline())]);
         }
         let [width, height] = self.scene().film.size;
         let text = format!("{}x{} png", 2 * width, 2 * height);
@@ -177,7 +180,10 @@ impl UpdateContext<'_> {
         self.model.export = Some(RunningExport { size, progress: 0.0, left: None });
         let (display, stop) = (self.model.display, self.model.stop);
         self.emit(Effect::ExportSized { scene: Arc::new(scene), format, display, stop });
-        self.say(format!("rendering {}x{} beside this picture · Ctrl-x cancels", size[0], size[1]));
+        self.say(format!(
+            "rendering {}x{} beside this picture · Ctrl-e writes it now",
+            size[0], size[1]
+        ));
         Ok(())
     }
 }

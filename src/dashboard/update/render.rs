@@ -1,13 +1,12 @@
 //! Commands on rendering, exports and the colour depth of the terminal.
 
 use crate::dashboard::model::Colors;
-use crate::dashboard::text::durations;
 use crate::dashboard::update::cycled;
 use crate::dashboard::update::prompt::stop_text;
-use crate::dashboard::{Answer, Effect, Format, ListCursor, Overlay, UpdateContext};
+use crate::dashboard::{Effect, Format, ListCursor, Overlay, UpdateContext};
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
-use zerkalo_render::session::{QUALITIES, Report, State};
+use zerkalo_render::session::{QUALITIES, State};
 
 impl UpdateContext<'_> {
     pub(super) fn pause(&mut self) {
@@ -35,48 +34,29 @@ impl UpdateContext<'_> {
         self.model.overlay = Some(Overlay::NoiseTargets(ListCursor { index, scroll: 0 }));
     }
 
-    /// Writes the picture. If its render has just begun, asks if the end is awaited.
     pub(super) fn export(&mut self, format: Format) {
-        let report = self.model.snapshot.as_ref().map(|snapshot| &snapshot.report);
-        let has_begun = |report: &&Report| {
-            matches!(report.state, State::Tracing)
-                && report.eta_seconds.is_some_and(|left| left.high > 2.0)
-        };
-        let Some(report) = report.filter(has_begun).filter(|_| self.model.watch.is_none()) else {
-            return self.export_now(format);
-        };
-        let left = report.eta_seconds.map_or(String::new(), durations);
-        let text = format!("The picture needs {left} more for its noise target.");
-        let [now, done]: [Answer; 2] = match format {
-            Format::Png => [
-                ('n', "write the PNG now", |c| c.export_now(Format::Png)),
-                ('w', "write it when converged", |c| c.export_when_done(Format::Png)),
-            ],
-            Format::Exr => [
-                ('n', "write the EXR now", |c| c.export_now(Format::Exr)),
-                ('w', "write it when converged", |c| c.export_when_done(Format::Exr)),
-            ],
-        };
-        self.ask(text, &[now, done]);
-    }
-
-    fn export_now(&mut self, format: Format) {
         self.emit(Effect::Export(format));
         self.say(format!("writing {} …", format.extension()));
     }
 
-    fn export_when_done(&mut self, format: Format) {
-        self.model.export_when_done = Some(format);
-        self.say(format!("{} when converged", format.extension()));
+    /// Returns `true` if the picture will be better in a moment: the render has not yet reached its
+    /// target.
+    pub(super) fn improves(&self) -> bool {
+        let report = self.model.snapshot.as_ref().map(|snapshot| &snapshot.report);
+        self.model.watch.is_none() && report.is_some_and(|r| matches!(r.state, State::Tracing))
     }
 
-    /// Writes the picture that [`Self::export_when_done`] awaits, if it is complete.
+    /// Writes a PNG as soon as the render ends.
+    pub(super) fn export_when_done(&mut self) {
+        self.model.export_when_done = true;
+        self.say("a PNG is written when the picture has converged");
+        self.export_if_done();
+    }
+
     pub(super) fn export_if_done(&mut self) {
-        let state = self.model.snapshot.as_ref().map(|snapshot| &snapshot.report.state);
-        if let Some(State::Finished(_)) = state
-            && let Some(format) = self.model.export_when_done.take()
-        {
-            self.export_now(format);
+        if self.model.export_when_done && self.model.snapshot.is_some() && !self.improves() {
+            self.model.export_when_done = false;
+            self.export(Format::Png);
         }
     }
 

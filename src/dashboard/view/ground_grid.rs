@@ -7,8 +7,6 @@ use zerkalo_terminal::cells::Raster;
 
 const DARK: [u8; 3] = [20, 22, 28];
 const LINE: [u8; 3] = [72, 78, 92];
-/// Colours of the lines x = 0 and z = 0.
-const AXES: [[u8; 3]; 2] = [[70, 110, 190], [190, 80, 80]];
 
 /// Returns the grid of lines at height 0, as the camera of `scene` sees it. Squares have ten steps of
 /// the arrow keys; lines end where they would be closer than two pixels.
@@ -32,18 +30,11 @@ pub fn raster(scene: &Scene, [width, height]: [usize; 2]) -> Raster {
         else {
             return DARK;
         };
-        let line = |axis: usize| {
-            let near = [beside, below].map(|other| other[axis]);
-            let crossed = near.iter().map(|other| other.floor().max(here[axis].floor()));
-            let is_sparse = near.iter().all(|other| (other - here[axis]).abs() < 0.5);
-            let changed = near.iter().any(|other| other.floor() != here[axis].floor());
-            (is_sparse && changed).then(|| crossed.fold(f64::NEG_INFINITY, f64::max) == 0.0)
+        let is_line = |axis: usize| {
+            let mut near = [beside[axis], below[axis]].into_iter();
+            let is_crossed = near.clone().any(|other| other.floor() != here[axis].floor());
+            is_crossed && near.all(|other| (other - here[axis]).abs() < 0.5)
         };
-        match [line(0), line(1)] {
-            [Some(true), _] => AXES[0],
-            [_, Some(true)] => AXES[1],
-            [None, None] => DARK,
-            _ => LINE,
-        }
+        if is_line(0) || is_line(1) { LINE } else { DARK }
     })
 }

@@ -69,13 +69,13 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     };
     let report = &snapshot.report;
     if !watching {
-        // A picture without objects is complete, but there is nothing to see; and while an export
-        // renders, its progress is what matters.
+        // A picture without objects is complete, but there is nothing to see. While an export
+        // renders, its progress says what is not complete.
         if model.is_empty() {
             parts.insert(0, part(0, vec![dim("empty")]));
             return parts;
         }
-        if model.export.is_none() {
+        if model.export.is_none() || !matches!(report.state, State::Finished(_)) {
             parts.insert(0, part(0, vec![state(model, report, theme)]));
         }
         if matches!(report.state, State::Idle | State::Failed(_)) {

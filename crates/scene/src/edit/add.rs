@@ -11,7 +11,9 @@ use crate::edit::{Edit, EditError, Target};
 use crate::light::{Falloff, Light, LightKind, Placement};
 use crate::material::Material;
 use crate::shape::{KINDS, Shape, compose};
-use crate::value::{Color, names, number, round_nice, round_significant, rounded_to, unit};
+use crate::value::{
+    Color, floor_log10, names, number, round_nice, round_significant, rounded_to, unit,
+};
 use crate::{Object, Scale, Scene, TransformOp};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -52,8 +54,8 @@ fn fresh_material(scene: &Scene) -> Material {
 }
 
 /// Adds an object. It rests on a surface, as near as possible to the middle of the view, and has an
-/// eighth of the view's width. A plane is put at height 0. Without `material`
-/// the object gets a new material. Fails if there is no such kind or material.
+/// eighth of the view's width. A plane is put at height 0. Without `material` the object gets a new
+/// material. Fails if there is no such kind or material.
 pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<Edit, EditError> {
     let size = usual_size(scene);
     let room = DVec3::splat(size);
@@ -64,13 +66,8 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     };
     face_camera(&mut shape, scene);
     if let Form::Plane(_) = shape.form() {
-        // A plane at height 0 would coincide with a ground there: it is put below all objects.
-        let lows = scene.objects.iter().filter_map(|o| Some(o.form().bounds()?.0.y));
-        let is_taken = ground_height(scene, base.with_y(size), size) == 0.0
-            && scene.objects.iter().any(|object| !object.form().is_solid());
-        let lowest = lows.reduce(f64::min).unwrap_or(0.0);
-        let height = if is_taken { round_nice(lowest - 0.1 * size, size) } else { 0.0 };
-        shape.anchor_points_mut().into_iter().for_each(|anchor| anchor[1] = height);
+        let height = plane_height(scene);
+        shape.anchor_points_mut().into_iter().for_each(|anchor| *anchor = [0.0, height, 0.0]);
     }
     let mut next = scene.clone();
     let name = free_object(scene, kind);
@@ -104,6 +101,18 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     let by = (base - factor * foot).map(|x| crate::value::round_fine(x, size));
     steps.extend([TransformOp::Scale(Scale([factor; 3])), TransformOp::Translate(by.to_array())]);
     steps
+}
+
+/// Returns the height of a new plane: 0, or a little below all objects if the ground is there.
+pub(super) fn plane_height(scene: &Scene) -> f64 {
+    let size = usual_size(scene);
+    let is_level =
+        |object: &Object| object.form().plane().is_some_and(|plane| plane.normal.y.abs() > 0.5);
+    let is_taken = scene.objects.iter().any(is_level)
+        && ground_height(scene, DVec3::from_array(scene.camera.eye), size) == 0.0;
+    let lows = scene.objects.iter().filter_map(|object| Some(object.form().bounds()?.0.y));
+    let under = lows.reduce(f64::min).unwrap_or(0.0) - 0.1 * size;
+    if is_taken { round_nice(under, size) } else { 0.0 }
 }
 
 /// Fits the mesh that `edit` reads for an object of `old` without a file into the placeholder's box.
@@ -180,9 +189,11 @@ pub(super) fn add_light_as(
     let lit: f64 = scene.lights.iter().map(|l| side(l).signum()).sum();
     let toward = if lit < 0.0 { right } else { -right };
     let from = toward * 0.8 - forward * 0.8 + DVec3::Y * 1.4;
-    let position = (center + from * (1.5 * radius)).map(|x| round_nice(x, radius)).to_array();
+    let tenth = floor_log10(radius) - 1;
+    let position = (center + from * (1.5 * radius)).map(|x| rounded_to(x, tenth)).to_array();
     let direction = (-from).normalize().map(|x| rounded_to(x, -2)).to_array();
-    let placement = Placement { position, direction, radius: relative_size * radius / 5.0 };
+    // A small light is bright, and its image in glossy surfaces is noisy for long.
+    let placement = Placement { position, direction, radius: 0.4 * relative_size * radius };
     let Some(placed) = LightKind::placed(kind, &placement) else {
         let found = format!("there is no kind of light called \"{kind}\"");
         let kinds = names(LightKind::FIELDS);
@@ -218,7 +229,7 @@ fn luminance(Color([red, green, blue]): Color) -> f64 {
 
 /// Brightness of a white diffuse surface that faces the first light. Surfaces of usual albedos at
 /// usual angles then have about the level 90 of 255.
-const EXPOSURE: f64 = 1.0;
+const EXPOSURE: f64 = 1.25;
 
 #[cfg(test)]
 mod tests {

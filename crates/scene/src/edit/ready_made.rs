@@ -2,14 +2,17 @@
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
-use crate::edit::add::{add_light_as, add_object, free_color, usual_size};
+use crate::edit::add::{add_light_as, add_object, free_color, plane_height, usual_size};
+use crate::edit::bounds::pivot_distance;
+use crate::edit::placement::ground_height;
 use crate::edit::properties::Word;
 use crate::edit::unique_name::{free_material, free_object};
 use crate::edit::{Edit, EditError, Target, set};
-use crate::material::{Checker, Material, Preset, Texture};
-use crate::shape::{CsgOperand, Cuboid, Difference, Rectangle, Shape};
-use crate::value::{Choice, Color, KeyNode, KeyValue, round_nice, round_significant, rounded_to};
-use crate::{Object, Scene, TransformOp};
+use crate::material::Preset;
+use crate::value::{
+    Choice, Color, KeyNode, KeyValue, number, rotated_y, round_nice, round_significant, rounded_to,
+};
+use crate::{Object, Scene};
 use glam::DVec3;
 
 /// Name and kind of each solid that is added with a preset.
@@ -142,107 +145,102 @@ fn solid(scene: &Scene, name: &str) -> Result<Edit, EditError> {
     let mut with_material = scene.clone();
     let material = material_of(&mut with_material, preset, None);
     let called = if preset == Preset::Diffuse { format!("{material} {body}") } else { name.into() };
-    let edit = add_object(&with_material, kind, Some(&material))?;
-    named(edit, &free_object(scene, &called))
-}
-
-/// Gives the object that `edit` has added the name `name`.
-fn named(mut edit: Edit, name: &str) -> Result<Edit, EditError> {
-    if let Some(object) = edit.scene.objects.last_mut() {
-        object.name = name.to_string();
-    }
+    let mut edit = add_object(&with_material, kind, Some(&material))?;
+    let name = free_object(scene, &called);
+    edit.scene
+        .objects
+        .iter_mut()
+        .next_back()
+        .into_iter()
+        .for_each(|last| last.name.clone_from(&name));
     Edit::checked(edit.scene, edit.target, format!("add {name}"))
 }
 
-fn floor(scene: &Scene) -> Result<Edit, EditError> {
+/// Adds the materials and objects of the scene file `text` under names that are free. `numbers` are
+/// the values of the words in angle brackets.
+fn add_parts(
+    scene: &Scene,
+    name: &str,
+    text: &str,
+    numbers: &[(&str, f64)],
+) -> Result<Edit, EditError> {
+    let fill =
+        |text: String, (word, x): &(&str, f64)| text.replace(&format!("<{word}>"), &number(*x));
+    let text = numbers.iter().fold(text.to_string(), fill);
+    let mut parts = Scene::parse(&text, name).map_err(|e| EditError::new(&e.to_string(), ""))?;
     let mut next = scene.clone();
+    for (name, material) in parts.materials {
+        let free = free_material(&next, &name);
+        parts.objects.iter_mut().for_each(|object| object.rename_material(&name, &free));
+        next.materials.insert(free, material);
+    }
+    for object in parts.objects {
+        let name = free_object(&next, &object.name);
+        next.objects.push(Object { name, ..object });
+    }
+    let target = Target::Object(next.objects.len() - 1);
+    Edit::checked(next, target, format!("add {name}"))
+}
+
+fn floor(scene: &Scene) -> Result<Edit, EditError> {
     // Squares of half the size of a new object, two in a repetition.
-    let mut checker = Checker {
-        even: Color([0.42, 0.36, 0.31]),
-        odd: Color([0.16, 0.13, 0.12]),
-        ..Checker::default()
-    };
-    checker.placement.scale = [round_significant(1.0 / usual_size(scene), 2); 2];
-    let material = Material {
-        color: Color::WHITE,
-        diffuse: 0.8,
-        reflection: 0.15,
-        roughness: 0.08,
-        texture: Some(Texture::Checker(checker)),
-        ..Material::default()
-    };
-    let material_name = free_material(scene, "floor");
-    next.materials.insert(material_name.clone(), material);
-    named(add_object(&next, "plane", Some(&material_name))?, &free_object(scene, "floor"))
+    let scale = round_significant(1.0 / usual_size(scene), 2);
+    let numbers = [("scale", scale), ("height", plane_height(scene))];
+    add_parts(scene, FLOOR, include_str!("ready_made/floor.toml"), &numbers)
 }
 
 /// Adds a mirror and its frame, which stand behind all solids and in front of a wall behind them.
 fn framed_mirror(scene: &Scene) -> Result<Edit, EditError> {
-    let camera = &scene.camera;
-    let ([_, up, forward], eye) = (camera.frame(), DVec3::from_array(camera.eye));
-    let heading = (-forward.x).atan2(-forward.z).to_degrees();
-    let turn = rounded_to(heading / 5.0, 0) * 5.0;
-    let away = -DVec3::new(turn.to_radians().sin(), 0.0, turn.to_radians().cos());
-    let size = usual_size(scene);
-    let aim = eye + forward * crate::edit::pivot_distance(scene);
-    let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
-    let depth_of = |corner: DVec3| away.dot(corner - aim);
-    let solids = forms.iter().filter(|form| form.is_solid()).filter_map(|form| form.bounds());
-    let depths = solids.map(|(low, high)| {
-        let middle = (low + high) / 2.0;
-        depth_of(middle) + ((high - low) / 2.0).dot(away.abs())
-    });
-    let behind = depths.reduce(f64::max).unwrap_or(0.0).max(0.0) + 1.5 * size;
-    let walls = forms.iter().filter(|form| !form.is_solid());
-    let wall = walls.filter_map(|wall| wall.cast(aim, away)).reduce(f64::min);
-    let depth = wall.map_or(behind, |wall| behind.min(wall - 0.2 * size));
-    let ground = super::placement::ground_height(scene, aim, size);
-    let nice = |x: f64| round_nice(x, 10.0 * size);
-    let base = (aim + away * depth).with_y(ground).map(nice);
+    let (base, turn) = place_behind(scene);
+    let eye = DVec3::from_array(scene.camera.eye);
+    let [_, up, forward] = scene.camera.frame();
+    let [half_width, half_height] = scene.camera.half_size(scene.film.size.map(f64::from));
     // The upper edge is seen, with some room above it.
-    let distance = forward.dot(base - eye).max(size);
-    let [half_width, half_height] = camera.half_size(scene.film.size.map(f64::from));
     let ray = forward + up * (0.8 * half_height);
     let level = |v: DVec3| v.with_y(0.0).length().max(1e-9);
-    let top = eye.y + ray.y * level(base - eye) / level(ray);
-    let width = round_significant(half_width * distance, 2);
+    let top = eye.y + ray.y * level(base - eye) / level(ray) - base.y;
+    let width = round_significant(half_width * forward.dot(base - eye).abs(), 2);
     let bar = round_significant(0.04 * width, 1);
-    let height = round_significant((top - ground - 2.0 * bar).clamp(0.3 * width, 0.66 * width), 2);
-    let mut next = scene.clone();
-    let glass = Material { roughness: 0.05, two_sided: false, ..Preset::Mirror.material() };
-    let wood = Material {
-        color: Color([0.5, 0.27, 0.1]),
-        diffuse: 0.6,
-        specular: 0.3,
-        exponent: 40.0,
-        ..Material::default()
-    };
+    let height = round_significant((top - 2.0 * bar).clamp(0.3 * width, 0.66 * width), 2);
+    let [front_x, _, front_z] = rotated_y([0.0, 0.0, 1.0], turn);
     let middle = bar + height / 2.0;
-    let mirror = Rectangle {
-        center: (base + DVec3::Y * middle).map(nice).to_array(),
-        size: [width, height],
-        normal: (-away).map(|x| rounded_to(x, -6)).to_array(),
-        up: [0.0, 1.0, 0.0],
-    };
-    let block = |size: [f64; 3]| {
-        CsgOperand::new(Shape::Cuboid(Cuboid { center: [0.0, nice(middle), 0.0], size }))
-    };
-    let outside = block([nice(width + 2.0 * bar), nice(height + 2.0 * bar), bar]);
-    let frame = Difference { of: vec![outside, block([width, height, 2.0 * bar])] };
-    let steps = [TransformOp::RotateY(turn), TransformOp::Translate(base.to_array())];
-    let steps = if turn == 0.0 { steps[1..].to_vec() } else { steps.to_vec() };
-    let parts = [
-        ("mirror frame", "frame", wood, Shape::Difference(frame), steps),
-        ("mirror", "mirror", glass, Shape::Rectangle(mirror), Vec::new()),
+    let numbers = [
+        ("x", base.x),
+        ("y", base.y),
+        ("z", base.z),
+        ("width", width),
+        ("height", height),
+        ("outer width", width + 2.0 * bar),
+        ("outer height", height + 2.0 * bar),
+        ("bar", bar),
+        ("depth", 2.0 * bar),
+        ("middle", middle),
+        ("center y", base.y + middle),
     ];
-    for (name, material_name, material, shape, transform) in parts {
-        let material_name = free_material(&next, material_name);
-        next.materials.insert(material_name.clone(), material);
-        let name = free_object(&next, name);
-        next.objects.push(Object { name, material: material_name, shape, transform });
-    }
-    let target = Target::Object(next.objects.len() - 1);
-    Edit::checked(next, target, format!("add {MIRROR}"))
+    let lengths = numbers.map(|(word, x)| (word, round_nice(x, width)));
+    let angles = [("turn", turn), ("front x", front_x), ("front z", front_z)];
+    let numbers = [&lengths[..], &angles].concat();
+    add_parts(scene, MIRROR, include_str!("ready_made/mirror.toml"), &numbers)
+}
+
+/// Returns a position on the ground behind all solids and before a wall behind them, and the rotation
+/// \[degrees\] about the vertical that turns what stands there to the camera.
+fn place_behind(scene: &Scene) -> (DVec3, f64) {
+    let ([_, _, forward], eye) = (scene.camera.frame(), DVec3::from_array(scene.camera.eye));
+    let turn = rounded_to((-forward.x).atan2(-forward.z).to_degrees() / 5.0, 0) * 5.0;
+    let away = -DVec3::from(rotated_y([0.0, 0.0, 1.0], turn));
+    let size = usual_size(scene);
+    let aim = eye + forward * pivot_distance(scene);
+    let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
+    let (solids, walls): (Vec<_>, Vec<_>) = forms.iter().partition(|form| form.is_solid());
+    let depths = solids.iter().filter_map(|form| form.bounds()).map(|(low, high)| {
+        away.dot((low + high) / 2.0 - aim) + ((high - low) / 2.0).dot(away.abs())
+    });
+    let behind = depths.fold(0.0, f64::max) + 1.5 * size;
+    let wall = walls.iter().filter_map(|wall| wall.cast(aim, away)).reduce(f64::min);
+    let depth = wall.map_or(behind, |wall| behind.min(wall - 0.2 * size));
+    let base = (aim + away * depth).with_y(ground_height(scene, aim, size));
+    (base.map(|x| round_nice(x, 10.0 * size)), turn)
 }
 
 #[cfg(test)]
@@ -250,6 +248,7 @@ mod tests {
     use super::*;
     use crate::edit::add::view_size;
     use crate::edit::bounds::Extent;
+    use crate::shape::Shape;
 
     /// Scene of the new file that the dashboard opens.
     fn empty() -> Scene {
@@ -298,6 +297,19 @@ mod tests {
         let again = add_ready_object(&scene, "gold cube").unwrap().scene;
         assert_eq!(again.materials.len(), scene.materials.len(), "gold is there");
         assert!(add_ready_object(&scene, "paper ball").is_err());
+    }
+
+    #[test]
+    fn mirror_faces_the_camera_from_every_side() {
+        for eye in [[4.0, 1.5, 3.0], [-300.0, 90.0, 10.0], [0.02, 0.01, -0.04]] {
+            let mut scene = empty();
+            scene.camera.eye = eye;
+            let scene = add_ready_object(&scene, MIRROR).unwrap().scene;
+            let Shape::Rectangle(mirror) = &scene.objects[1].shape else { panic!() };
+            let to_eye = (DVec3::from(eye) - DVec3::from(mirror.center)).with_y(0.0);
+            let along = DVec3::from(mirror.normal).dot(to_eye.normalize());
+            assert!(along > 5f64.to_radians().cos(), "{eye:?}: {along}");
+        }
     }
 
     #[test]

@@ -116,10 +116,8 @@ pub(super) fn replace(
         part.rebase();
     }
     let note = gone.map(|rival| format!("{first} replaces {rival}."));
-    let is_unseen = match target {
-        Target::Material(name) => key == "metal" && !next.materials[name].shows_f0(),
-        _ => false,
-    };
+    let is_unseen = key == "metal"
+        && matches!(target, Target::Material(name) if !next.materials[name].shows_f0());
     let note =
         note.or_else(|| is_unseen.then(|| format!("metal has no effect here. {METAL_REMEDY}")));
     Ok(Edit::checked(next, target.clone(), label(scene, target, key))?.with_note(note))

@@ -61,18 +61,21 @@ fn patch_table(
     takes: ValueType,
 ) {
     let old = if let ValueType::Named(_) = takes { &rename(table, old, new) } else { old };
-    // A table that loses its preset gets all keys.
+    // A table that loses its preset gets all keys. In one that gets a preset, keys without text
+    // override it.
+    let overrides = new.contains_key(PRESET);
     let is_omitted = |key: &str, value: &Value| {
         let ValueType::Table(fields) = takes else { return false };
         let field = fields.iter().find(|field| field.name == key);
-        !new.contains_key(PRESET) && field.is_some_and(|field| is_default(field, value))
+        !overrides && field.is_some_and(|field| is_default(field, value))
     };
     let mut removed = Vec::new();
     let mut added = Vec::new();
     for (key, takes) in keys(takes, old, new) {
         match (old.get(&key), new.get(&key)) {
             (Some(_), None) if table.contains_key(&key) => removed.push(key),
-            (old, Some(value)) if old != Some(value) => match table.get_mut(&key) {
+            (old, Some(value)) if overrides || old != Some(value) => match table.get_mut(&key) {
+                Some(_) if old == Some(value) => {}
                 Some(item) => patch_item(keeper, item, headers, old, value, takes),
                 None if is_omitted(&key, value) => {}
                 None => added.push((key, takes, value)),

@@ -62,10 +62,8 @@ impl Preset {
 
     /// Returns the model of the reflectance; `None` for the default.
     pub(super) fn fresnel(self) -> Option<Fresnel> {
-        match self {
-            Self::Glass | Self::FrostedGlass | Self::Water => Some(Fresnel::Dielectric),
-            _ => self.f0().map(|_| Fresnel::Schlick),
-        }
+        let is_clear = matches!(self, Self::Glass | Self::FrostedGlass | Self::Water);
+        if is_clear { Some(Fresnel::Dielectric) } else { self.f0().map(|_| Fresnel::Schlick) }
     }
 
     /// Returns the material without any override.
@@ -89,8 +87,8 @@ impl Preset {
             ..plain.clone()
         };
         match self {
-            Self::Gold | Self::Silver | Self::Copper | Self::Brass => metal(0.06),
-            Self::Chrome => metal(0.02),
+            Self::Gold | Self::Silver | Self::Copper | Self::Brass => metal(0.03),
+            Self::Chrome => metal(0.01),
             Self::Iron => metal(0.5),
             Self::BrushedMetal => metal(0.4),
             Self::Glass => clear(1.517),
@@ -148,6 +146,12 @@ mod tests {
             assert_eq!(document.text(), format!("[materials.a] # mine\n{expected}"), "{key}");
             assert_eq!(Scene::parse(document.text(), "a.toml").unwrap(), edited, "{key}");
         }
+        // A default that the file does not name can override a preset.
+        let mut plain = Document::parse("[materials.a]\nambient = 0.5\n".into(), "a.toml").unwrap();
+        let gold = set(plain.scene(), &a, "preset", "gold").unwrap().scene;
+        let cone = set(&gold, &a, "lobe", "cone").unwrap().scene;
+        plain.apply(&cone);
+        assert_eq!(plain.text(), "[materials.a]\npreset = \"gold\"\nlobe = \"cone\"\n");
         // Without its preset a material keeps all values.
         let free = set(&scene, &a, "preset", "").unwrap().scene;
         document.apply(&free);

@@ -72,10 +72,9 @@ pub(crate) fn written(takes: ValueType, node: &dyn KeyNode) -> Value {
             let entry = |field: &Field| {
                 let child = node.child(field.name)?;
                 let of_base = base.as_ref().and_then(|base| base.child(field.name));
-                let is_left_out = match field.preset {
-                    DefaultValue::Without(_) => child.is_absent(),
-                    _ => of_base.is_some_and(|of_base| of_base.value() == child.value()),
-                };
+                let is_of_base = || of_base.is_some_and(|of_base| of_base.value() == child.value());
+                let is_optional = matches!(field.preset, DefaultValue::Without(_));
+                let is_left_out = if is_optional { child.is_absent() } else { is_of_base() };
                 (!is_left_out).then(|| (field.name.to_string(), written(field.takes, child)))
             };
             Value::Table(fields.iter().filter_map(entry).collect())

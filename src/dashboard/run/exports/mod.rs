@@ -98,6 +98,8 @@ impl Exporter {
 
 /// Export that renders the scene at a size of the user's choice, in a separate thread.
 pub struct ResizedExport {
+    /// `true` if the picture is to be written as it is.
+    finished: Arc<AtomicBool>,
     cancelled: Arc<AtomicBool>,
     worker: Worker<()>,
 }
@@ -112,8 +114,8 @@ impl ResizedExport {
         exporter: Exporter,
         results: Sender<Message>,
     ) -> io::Result<Self> {
-        let cancelled = Arc::new(AtomicBool::new(false));
-        let cancel_flag = Arc::clone(&cancelled);
+        let [finished, cancelled] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+        let [finish_flag, cancel_flag] = [&finished, &cancelled].map(Arc::clone);
         let worker = Worker::spawn("export", move || {
             let report_progress = |progress| {
                 if !cancel_flag.load(Ordering::Relaxed) {
@@ -121,13 +123,19 @@ impl ResizedExport {
                     let _ = results.send(Message::ExportProgress(progress));
                 }
             };
-            let result = finish(session, format, exporter, &cancel_flag, report_progress);
+            let flags = [&*finish_flag, &*cancel_flag];
+            let result = finish(session, format, exporter, flags, report_progress);
             report_progress(None);
             if let Some(result) = result {
                 let _ = results.send(Message::Exported(result));
             }
         })?;
-        Ok(Self { cancelled, worker })
+        Ok(Self { finished, cancelled, worker })
+    }
+
+    /// Ends the render and writes the picture as it is.
+    pub fn finish(&self) {
+        self.finished.store(true, Ordering::Relaxed);
     }
 
     /// Cancels the render. A file that is being written is completed.
@@ -148,12 +156,15 @@ fn finish(
     session: Session,
     format: Format,
     exporter: Exporter,
-    cancelled: &AtomicBool,
+    [finished, cancelled]: [&AtomicBool; 2],
     report_progress: impl Fn(Option<(f64, Option<Interval>)>),
 ) -> Option<Result<Exported, String>> {
     loop {
         if cancelled.load(Ordering::Relaxed) {
             return None;
+        }
+        if finished.load(Ordering::Relaxed) {
+            break;
         }
         let Some(snapshot) = session.wait(POLL_INTERVAL) else { continue };
         match snapshot.report.state {
