@@ -2,7 +2,7 @@
 
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::{Layout, Model};
-use ratatui::style::{Modifier, Style};
+use ratatui::style::Modifier;
 use zerkalo_scene::edit::Target;
 use zerkalo_terminal::cells::{Oklab, Raster};
 use zerkalo_world::FirstHit;
@@ -51,7 +51,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
             .map(|c| zerkalo_render::film::quantised_8(255.0 * (c / most).powf(1.0 / 2.2)));
         let style = match model.selection == Target::Light(mark.light) {
             true => theme.selected(true),
-            false => theme.swatch(color).unwrap_or(Style::new()).patch(theme.badge()),
+            false => theme.swatch(color).unwrap_or_default().patch(theme.badge()),
         };
         let style = style.add_modifier(Modifier::BOLD);
         let glyph = if light.on { '●' } else { '○' };

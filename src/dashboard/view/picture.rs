@@ -132,11 +132,11 @@ impl PictureView {
     }
 
     /// Returns a raster of the difference in luma, live minus pinned, in false colour. The scale
-    /// ends at the largest difference, rounded up by [`round_up`].
+    /// ends at the 99 % quantile of the differences, rounded up by [`round_up`].
     fn difference(&mut self, model: &Model, snapshot: &Snapshot, size: Place) -> Option<Raster> {
         let live = beauty(model, snapshot, size)?;
         let pinned = self.pinned(model, size)?;
-        let (mut squares, mut largest) = (0.0, 0.0f64);
+        let mut squares = 0.0;
         let mut lumas = Vec::with_capacity(live.pixels.len());
         for (live, pinned) in live.pixels.iter().zip(&pinned.pixels) {
             let change = [0, 1, 2].map(|c| f64::from(live[c]) - f64::from(pinned[c]));
@@ -144,11 +144,14 @@ impl PictureView {
                 (change[0] * change[0] + change[1] * change[1] + change[2] * change[2]) / 3.0;
             // Luma weights of Rec. 709.
             let luma = 0.2126 * change[0] + 0.7152 * change[1] + 0.0722 * change[2];
-            largest = largest.max(luma.abs());
             lumas.push(luma);
         }
         let rms = (squares / lumas.len().max(1) as f64).sqrt();
-        let end = round_up(largest.max(1.0));
+        let mut sizes: Vec<f64> = lumas.iter().map(|luma| luma.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        // A few bright pixels, such as the edge of a lamp, do not darken the rest.
+        let quantile = sizes.get(sizes.len() * 99 / 100).copied().unwrap_or(0.0);
+        let end = round_up(quantile.max(1.0));
         self.legend = Some(Legend::difference(end, rms));
         let [columns, rows] = size.0;
         Some(Raster::from_fn(columns, rows, |i| difference(lumas[i] / end)))

@@ -79,10 +79,25 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
     if let Some(levels) = probe.tile_rmse_levels {
         lines.push(("tile", format!("± {} levels", number(levels))));
     }
+    if let Some(text) = sources(model, &probe.error_shares) {
+        lines.push(("noise of", text));
+    }
     if let Some(name) = seen(model, probe.pixel) {
         lines.push(("object", name));
     }
     lines
+}
+
+/// Names the two light groups with the largest shares in the error, such as `lamp 88 %, sky 9 %`.
+/// Returns `None` if there is only one group.
+fn sources(model: &Model, shares: &[f64]) -> Option<String> {
+    let lighting = model.snapshot.as_ref()?.lighting.as_ref()?;
+    let names = lighting.groups.names(&lighting.compiled);
+    let mut found: Vec<_> = shares.iter().copied().zip(names).collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let percent = |(share, name): &(f64, String)| format!("{name} {:.0} %", 100.0 * share);
+    let texts: Vec<_> = found.iter().take(2).map(percent).collect();
+    (found.len() > 1).then(|| texts.join(", "))
 }
 
 /// Returns the label of the object that is visible at a film pixel (column, row).

@@ -7,7 +7,7 @@ use crate::film::noise::Estimator;
 use crate::film::store::Film;
 
 /// Samples, value and error of one pixel under given light weights and display transform.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PixelProbe {
     /// Column and row of the pixel in the film.
     pub pixel: [usize; 2],
@@ -22,6 +22,9 @@ pub struct PixelProbe {
     pub difference: Option<[f64; 3]>,
     /// Estimated RMSE of the pixel's tile, in 8-bit levels. `None` without an estimate.
     pub tile_rmse_levels: Option<f64>,
+    /// Share of each light group in the squared error of the pixel's tile in linear radiance; empty
+    /// without an estimate or without error.
+    pub error_shares: Vec<f64>,
 }
 
 impl PixelProbe {
@@ -52,6 +55,17 @@ impl PixelProbe {
         }
         let noise = Estimator::new(&film.header.scales, weights, display).tile_so_far(tile);
         probe.tile_rmse_levels = noise.map(|noise| noise.of_all().levels.sqrt());
+        let square = |group: usize| {
+            let mut alone = LightWeights { weights: vec![[0.0; 3]; weights.weights.len()] };
+            alone.weights[group] = weights.weights[group];
+            let noise = Estimator::new(&film.header.scales, &alone, display).tile_so_far(tile);
+            noise.map_or(0.0, |noise| noise.of_all().linear)
+        };
+        let squares: Vec<f64> = (0..weights.weights.len()).map(square).collect();
+        let sum: f64 = squares.iter().sum();
+        if sum > 0.0 {
+            probe.error_shares = squares.into_iter().map(|square| square / sum).collect();
+        }
         Some(probe)
     }
 }
@@ -70,7 +84,7 @@ mod tests {
         let empty = probe(&film, [19, 17]).unwrap();
         assert_eq!((empty.samples, empty.radiance, empty.difference), ([0; 2], [0.0; 3], None));
         assert_eq!(empty.tile_rmse_levels, None);
-        assert_eq!([probe(&film, [20, 0]), probe(&film, [0, 18])], [None; 2]);
+        assert_eq!([probe(&film, [20, 0]), probe(&film, [0, 18])], [None, None]);
         fill(&mut film, 2, |x, y, r| {
             let v = if [x, y] == [19, 17] { [2.0, 6.0][r] } else { 2.0 };
             vec![v, v, v, v, v, 4.0]
@@ -86,6 +100,7 @@ mod tests {
         assert!((noise.linear - 5.0 / 24.0).abs() < 1e-12, "{noise:?}");
         assert_eq!(full.tile_rmse_levels, Some(noise.levels.sqrt()));
         assert!(noise.levels > 0.0);
+        assert_eq!(full.error_shares, [1.0, 0.0], "the second light has no error");
         film.restart();
         each_tile(&mut film, |tile, _| tile.set_lattice(8));
         assert_eq!(probe(&film, [16, 16]).unwrap().samples, [1, 0]);

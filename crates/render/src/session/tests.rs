@@ -90,6 +90,16 @@ fn of_several_scenes_only_the_newest_is_compiled() {
 }
 
 #[test]
+fn task_after_a_new_scene_gets_its_picture() {
+    let mut session = session(endless());
+    for width in [64, 80] {
+        session.set_scene(scene(width));
+        let found = session.with(|state, report| (state.film.header.width, report.samples));
+        assert!(found.is_some_and(|(w, samples)| w == width as usize && samples > 0), "{found:?}");
+    }
+}
+
+#[test]
 fn newest_scene_is_never_lost() {
     let mut session = session(endless());
     for round in 0..120u64 {

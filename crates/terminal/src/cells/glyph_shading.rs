@@ -40,8 +40,8 @@ pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
     Oklab::of_linear([0, 1, 2].map(|c| coverage * fg[c] + (1.0 - coverage) * bg[c]))
 }
 
-/// Greys, whose sparse glyphs on black show dark greys.
-const GREYS: [u8; 3] = [7, 8, 15];
+/// Light grey, whose sparse glyphs on black show the greys that are darker than all shades.
+const GREY: u8 = 7;
 /// Mean OKLab lightness to which [`tone_curve`] raises dark pictures.
 const MEAN_LIGHTNESS: f32 = 0.5;
 
@@ -55,14 +55,16 @@ pub fn tone_curve(raster: &Raster) -> [u8; 256] {
 }
 
 /// Cells for colours: each of 16 colours alone, each shading glyph on a neutral background, and
-/// each sparse glyph in grey on black.
+/// sparse glyphs in grey on black.
 static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     let mixed = NEUTRAL.into_iter().flat_map(|bg| (0..16).map(move |fg| (fg, bg)));
     let mixed = mixed.filter(|(fg, bg)| fg != bg).flat_map(|(fg, bg)| {
         SHADES.map(|glyph| PictureCell { glyph, fg: Color::Indexed(fg), bg: Color::Indexed(bg) })
     });
-    let sparse = COVERAGE[1..5].iter().flat_map(|(glyph, _)| {
-        GREYS.map(|fg| PictureCell { glyph: *glyph, fg: Color::Indexed(fg), bg: Color::Indexed(0) })
+    let sparse = COVERAGE[1..3].iter().map(|(glyph, _)| PictureCell {
+        glyph: *glyph,
+        fg: Color::Indexed(GREY),
+        bg: Color::Indexed(0),
     });
     (0..16).map(flat).chain(mixed).chain(sparse).collect()
 });

@@ -85,19 +85,23 @@ pub fn nearest_xterm(rgb: [u8; 3]) -> u8 {
     FIRST + XTERM.nearest(rgb) as u8
 }
 
-/// Luma from which [`vivid`] keeps colours, and luma up to which it is strongest.
-const PALE_LUMA: [f32; 2] = [141.0, 85.0];
+/// Luma up to which [`vivid`] is strongest, and luma from which it keeps colours.
+const DARK: [f32; 2] = [85.0, 141.0];
+/// Difference of the largest and the smallest channel, likewise.
+const WEAK: [f32; 2] = [64.0, 112.0];
 /// Largest factor by which [`vivid`] raises the saturation.
 const VIVIDNESS: f32 = 2.3;
 
-/// Raises the saturation of dark colours. Dark colours of palettes are grey or saturated, so that
+/// Raises the saturation of dark weak colours. Dark colours of palettes are grey or saturated, so that
 /// the nearest one of a weak colour has no hue.
 pub fn vivid(rgb: [u8; 3]) -> [u8; 3] {
     let channels = rgb.map(f32::from);
     // Luma weights of Rec. 709.
     let luma = 0.2126 * channels[0] + 0.7152 * channels[1] + 0.0722 * channels[2];
-    let darkness = ((PALE_LUMA[0] - luma) / (PALE_LUMA[0] - PALE_LUMA[1])).clamp(0.0, 1.0);
-    let factor = 1.0 + (VIVIDNESS - 1.0) * darkness;
+    let range =
+        channels.into_iter().fold(0.0, f32::max) - channels.into_iter().fold(255.0, f32::min);
+    let below = |[low, high]: [f32; 2], x: f32| ((high - x) / (high - low)).clamp(0.0, 1.0);
+    let factor = 1.0 + (VIVIDNESS - 1.0) * below(DARK, luma) * below(WEAK, range);
     channels.map(|c| (luma + factor * (c - luma)).round().clamp(0.0, 255.0) as u8)
 }
 

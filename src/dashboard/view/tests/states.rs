@@ -156,6 +156,7 @@ fn probing(model: &mut Model) {
         levels: [127.46, 118.2, 83.9],
         difference: Some([0.012, 0.01, 0.004]),
         tile_rmse_levels: Some(0.84),
+        error_shares: Vec::new(),
     });
 }
 
