@@ -252,7 +252,7 @@ fn wanted(model: &Model) -> Option<(Protocol, PixelGrid, Arc<Detail>)> {
         && detail.generation == snapshot.report.generation
         && detail.display == model.display
         && (model.watch.is_some()
-            || snapshot.weights_for(model.scene()).as_ref() == Some(&detail.weights));
+            || snapshot.weights_for(model.seen()).as_ref() == Some(&detail.weights));
     let is_covered = matches!(model.overlay, Some(Overlay::ViewerImage(_)));
     let is_picture = model.channel == DisplayChannel::Beauty && !model.file.unreadable;
     let is_wanted = is_current && is_picture && !is_covered;

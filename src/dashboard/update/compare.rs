@@ -28,7 +28,7 @@ impl UpdateContext<'_> {
     /// Sets the exposure that gives half of the picture's pixels more than [`MIDDLE_LEVEL`].
     pub(super) fn expose(&mut self) {
         let picture = self.model.snapshot.as_ref().and_then(|snapshot| {
-            let newest = snapshot.weights_for(self.scene());
+            let newest = snapshot.weights_for(self.seen());
             let picture = snapshot.picture.as_ref()?;
             Some(picture.mixed(newest.as_ref().unwrap_or(&snapshot.weights)))
         });

@@ -332,3 +332,34 @@ pub fn prefetch<T>(value: &T) {
     #[cfg(not(target_arch = "x86_64"))]
     let _ = value;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{PI, TAU};
+
+    /// Returns the largest errors of atan2, in radians, and of sine and cosine, at angles all around.
+    fn errors_of_angles<L: SimdFloat>() -> [f64; 2] {
+        let (mut of_angle, mut of_sine) = (0.0f64, 0.0f64);
+        let rounded = |x: f64| L::from_f64(x).lane(0).to_f64();
+        for i in 0..10_000 {
+            let angle = rounded(TAU * (f64::from(i) + 0.37) / 10_000.0 - PI);
+            let (sin, cos) = L::from_f64(angle).sin_cos();
+            let [sin, cos] = [sin, cos].map(|x| x.lane(0).to_f64());
+            of_sine = of_sine.max((sin - angle.sin()).abs()).max((cos - angle.cos()).abs());
+            let found = L::from_f64(sin).atan2(L::from_f64(cos)).lane(0).to_f64();
+            of_angle = of_angle.max((found - sin.atan2(cos)).abs());
+        }
+        [of_angle, of_sine]
+    }
+
+    #[test]
+    fn angles_in_lanes_have_errors_of_a_few_ulps() {
+        for ([of_angle, of_sine], ulp) in [
+            (errors_of_angles::<Single>(), f64::from(f32::EPSILON)),
+            (errors_of_angles::<Double>(), f64::EPSILON),
+        ] {
+            assert!(of_angle < 3.0 * ulp && of_sine < ulp, "{of_angle}, {of_sine}");
+        }
+    }
+}

@@ -4,11 +4,11 @@
 
 mod hash;
 mod packet_sampler;
-mod piecewise_constant_2d;
+mod piecewise_linear_2d;
 mod sobol;
 pub mod warp;
 
 pub use packet_sampler::{
     CameraDimensions, PacketSampler, SampleBlock, SampleSettings, Sampler, SamplerKind,
 };
-pub use piecewise_constant_2d::{PiecewiseConstant2D, PixelSample};
+pub use piecewise_linear_2d::PiecewiseLinear2D;

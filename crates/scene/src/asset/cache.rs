@@ -316,7 +316,7 @@ mod tests {
     }
 
     /// Checks that files are refused by the sum of their headers, of which none is decoded. Each of
-    /// them is short, and declares an environment that takes half a gigabyte.
+    /// them is short, and declares an environment that takes 738 MB.
     #[test]
     fn sum_of_all_files_is_compared_with_memory() {
         let folder = tempfile::tempdir().unwrap();
@@ -331,7 +331,7 @@ mod tests {
             .collect();
         let (assets, reads) = counted();
         let error = assets.check_total_memory(&files).unwrap_err();
-        let words = "with the other 999 files of the scene, this file needs 53";
+        let words = "with the other 999 files of the scene, this file needs 738";
         assert!(error.found.starts_with(words), "{error}");
         assert!(error.found.contains(" GB of memory, and "), "{error}");
         assert!(error.expected.contains("fewer or smaller"), "{error}");

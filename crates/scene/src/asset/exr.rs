@@ -350,7 +350,8 @@ mod tests {
                 image.chromaticities = Some(chromaticities(red, green));
             });
             let map = crate::asset::RadianceMap::parse(&source(bytes))?;
-            Ok::<_, AssetError>(map.radiance([0.0, 0.0, -1.0]))
+            let ahead = zerkalo_kernel::lanes::Vec3::<f64>::of([0.0, 0.0, -1.0]);
+            Ok::<_, AssetError>(map.radiance(ahead, true).0.lane(0))
         };
         assert_eq!(read(Vec2(0.64, 0.33), Vec2(0.3, 0.6)), Ok([8.0, 2.0, 1.0]));
         let exchanged = read(Vec2(0.3, 0.6), Vec2(0.64, 0.33)).unwrap();

@@ -30,4 +30,4 @@ pub use loaded::{Loaded, Reading};
 pub use memory::AssetKind;
 pub(crate) use mesh::{CREASE_ANGLE, parse as parse_mesh};
 pub use mesh::{MAX_TRIANGLES, MAX_VERTICES};
-pub use radiance_map::RadianceMap;
+pub use radiance_map::{DirectionSample, RadianceMap};

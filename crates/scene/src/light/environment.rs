@@ -5,12 +5,12 @@
 //! environment = { zenith = [0.2, 0.4, 0.9], horizon = [0.9, 0.9, 0.8], nadir = [0.2, 0.2, 0.2] }
 //! ```
 
-use crate::asset::{Loaded, RadianceMap, Reading};
+use crate::asset::{DirectionSample, Loaded, RadianceMap, Reading};
 use crate::light::{LightDesc, LightForm, LightSample};
 use crate::value::{Color, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
-use zerkalo_kernel::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
+use zerkalo_kernel::lanes::{SimdFloat, Vec3};
 
 /// Number of rows of the image that represents a gradient environment.
 const GRADIENT_ROWS: u32 = 512;
@@ -60,7 +60,7 @@ impl Environment {
             let horizon = self.horizon.0;
             std::array::from_fn(|c| (horizon[c] + height.abs() * (end[c] - horizon[c])) as f32)
         };
-        RadianceMap::new([1, GRADIENT_ROWS], (0..GRADIENT_ROWS).map(row).collect())
+        RadianceMap::new([1, GRADIENT_ROWS], &(0..GRADIENT_ROWS).map(row).collect::<Vec<_>>())
     }
 }
 
@@ -78,7 +78,7 @@ impl LightDesc for Environment {
 pub struct EnvironmentLight {
     map: Arc<RadianceMap>,
     /// Sine and cosine of the angle of rotation.
-    rotation: (f64, f64),
+    rotation: [f64; 2],
 }
 
 impl EnvironmentLight {
@@ -88,66 +88,34 @@ impl EnvironmentLight {
             Some(_) => environment.map()?.clone(),
             None => Arc::new(environment.gradient()),
         };
-        Some(Self { map, rotation: environment.rotation.to_radians().sin_cos() })
+        Some(Self { map, rotation: environment.rotation.to_radians().sin_cos().into() })
     }
 
     pub fn map(&self) -> &RadianceMap {
         &self.map
     }
 
-    /// Returns the direction in a lane, rotated from scene coordinates to coordinates of the image.
-    fn in_image<L: SimdFloat>(&self, direction: Vec3<L>, lane: usize) -> [f64; 3] {
-        let (sin, cos) = self.rotation;
-        let [x, y, z] = direction.lane(lane).map(L::Scalar::to_f64);
-        [x * cos - z * sin, y, x * sin + z * cos]
-    }
-
     /// Returns the radiance that arrives from the unit vectors `direction`, and the density
     /// [1/sr] with which [`EnvironmentLight::sample`] draws them. Both are zero outside `lanes`.
     #[inline(never)]
     pub fn radiance<L: SimdFloat>(&self, direction: Vec3<L>, lanes: L::Mask) -> (Vec3<L>, L) {
-        let (mut radiance, mut density) = ([[0.0; 3]; MAX_WIDTH], [0.0; MAX_WIDTH]);
-        for_each(lanes, |lane| {
-            let direction = self.in_image(direction, lane);
-            radiance[lane] = self.map.radiance(direction);
-            density[lane] = self.map.density(direction);
-        });
-        (
-            Vec3::from_fn(|lane| radiance[lane].map(L::Scalar::from_f64)),
-            L::from_fn(|lane| L::Scalar::from_f64(density[lane])),
-        )
+        let ([sin, cos], Vec3 { x, y, z }) = (self.rotation.map(L::from_f64), direction);
+        self.map.radiance(Vec3::new(x * cos - z * sin, y, x * sin + z * cos), lanes)
     }
 
-    /// Samples a direction for each of `lanes`, with a density in proportion to the environment's
-    /// luminance. In other lanes the irradiance is zero. `u` and `v` are uniform in [0, 1).
+    /// Samples a direction for each of `lanes`, where the environment is brighter than on average.
+    /// In other lanes the irradiance is zero. `u` and `v` are uniform in [0, 1).
     #[inline(never)]
     pub fn sample<L: SimdFloat>(&self, (u, v): (L, L), lanes: L::Mask) -> LightSample<L> {
-        let (sin, cos) = self.rotation;
-        let (mut wi, mut irradiance) = ([[0.0, 1.0, 0.0]; MAX_WIDTH], [[0.0; 3]; MAX_WIDTH]);
-        let mut density = [1.0; MAX_WIDTH];
-        for_each(lanes, |lane| {
-            let sample = self.map.sample(u.lane(lane).to_f64(), v.lane(lane).to_f64());
-            let [x, y, z] = sample.direction;
-            wi[lane] = [x * cos + z * sin, y, z * cos - x * sin];
-            irradiance[lane] = self.map.radiance(sample.direction).map(|l| l / sample.density);
-            density[lane] = sample.density;
-        });
+        let [sin, cos] = self.rotation.map(L::from_f64);
+        let DirectionSample { direction, radiance, density } = self.map.sample((u, v), lanes);
+        let Vec3 { x, y, z } = direction;
         LightSample {
-            wi: Vec3::from_fn(|lane| wi[lane].map(L::Scalar::from_f64)),
+            wi: Vec3::new(x * cos + z * sin, y, z * cos - x * sin),
             distance: L::from_f64(L::MAX),
-            irradiance: Vec3::from_fn(|lane| irradiance[lane].map(L::Scalar::from_f64)),
-            density: L::from_fn(|lane| L::Scalar::from_f64(density[lane])),
+            irradiance: radiance * (L::one() / density),
+            density,
         }
-    }
-}
-
-/// Calls `action` with the number of each lane that is true in the mask `lanes`.
-#[inline(always)]
-fn for_each(lanes: impl Mask, mut action: impl FnMut(usize)) {
-    let mut remaining = lanes.bits();
-    while remaining != 0 {
-        action(remaining.trailing_zeros() as usize);
-        remaining &= remaining - 1;
     }
 }
 
@@ -195,8 +163,8 @@ mod tests {
     /// -z to -x.
     #[test]
     fn rotation_is_counter_clockwise_from_above() {
-        let pixels = (0..8).map(|i| [f32::from(u8::from(i % 4 == 1 || i % 4 == 2)); 3]).collect();
-        let map = Arc::new(RadianceMap::new([4, 2], pixels));
+        let pixels = [0, 1, 2, 3].map(|i| [f32::from(u8::from(i == 1 || i == 2)); 3]).repeat(2);
+        let map = Arc::new(RadianceMap::new([4, 2], &pixels));
         let mut environment =
             Environment { file: "a".to_string(), rotation: 90.0, ..Environment::default() };
         environment.resolve(|_| Some(Ok(map)));

@@ -137,7 +137,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let arrives = light.irradiance.x.gt(L::zero());
             let arrives = arrives & interaction.geometric.dot(light.wi).gt(L::zero());
             let rays = source.visible.then_some(&glossy);
-            let value = self.reflected(light, arrives, rays, |pdf| pdf);
+            let value = self.reflected(light, arrives, rays, |_| L::one());
             let lit = value.max_element().gt(L::zero());
             let shadow = |vertex: &Self, lit| {
                 let ray = Ray { origin, direction: light.wi };
@@ -162,23 +162,24 @@ impl<L: SimdFloat> Vertex<'_, L> {
 
     /// Returns the BSDF [1/sr] times the cosine of the angle of incidence, weighted for multiple
     /// importance sampling, in the lanes in which `light` `arrives` at the surface. `rays` are the
-    /// reflected rays that may hit the light; `None` if it is invisible to them. `diffuse` gets the
-    /// density [1/sr] of cosine-weighted directions and returns it times its weight.
+    /// reflected rays that may hit the light; `None` if it is invisible to them. `weight` gets the
+    /// density [1/sr] of cosine-weighted directions and returns the weight of the diffuse part and
+    /// the highlights.
     #[inline(always)]
     pub fn reflected(
         &self,
         light: &LightSample<L>,
         arrives: L::Mask,
         rays: Option<&ReflectedRays<L>>,
-        diffuse: impl FnOnce(L) -> L,
+        weight: impl FnOnce(L) -> L,
     ) -> Vec3<L> {
         let (world, interaction) = (self.world, self.interaction);
         let cos_light = interaction.normal.dot(light.wi);
         let direct = interaction.direct_mask & arrives & cos_light.gt(L::zero());
         let mut value = Vec3::zero();
         if direct.any() {
-            let diffuse = diffuse(cosine_pdf(cos_light));
-            value = self.direct_value(light.wi, diffuse, direct).masked(direct);
+            let pdf = cosine_pdf(cos_light);
+            value = (self.direct_value(light.wi, pdf, direct) * weight(pdf)).masked(direct);
         }
         let Some(rays) = rays else { return value };
         let query = self.query();

@@ -1,10 +1,10 @@
 //! Light of environments, by multiple importance sampling.
 //!
-//! Three strategies find the light of an environment. The first samples a direction with a density
-//! in proportion to the luminance of the environment. The second is the reflected ray of a glossy
-//! lobe. The third samples a cosine-weighted direction at a diffuse surface. Glossy lobes combine
-//! the first and the second by the power heuristic, diffuse surfaces the first and the third.
-//! Highlights use only the first. Mirrors and the camera use only the light at the end of their ray.
+//! Three strategies find the light of an environment. The first samples a direction where the
+//! environment is brighter than on average. The second is the reflected ray of a glossy lobe. The
+//! third samples a cosine-weighted direction. Glossy lobes combine the first and the second by the
+//! power heuristic, diffuse surfaces and highlights the first and the third. Mirrors and the camera
+//! use only the light at the end of their ray.
 //!
 //! A ray that starts at a diffuse bounce adds nothing where it escapes, because direct lighting at
 //! the start of the ray already includes all environments.
@@ -54,17 +54,16 @@ impl<L: SimdFloat> Vertex<'_, L> {
     pub fn environment_lighting(&mut self, glossy: &ReflectedRays<L>) {
         let interaction = self.interaction;
         self.out.counts.glossy = true;
-        let is_diffuse = interaction.direct_mask & interaction.diffuse.max_element().gt(L::zero());
         for (index, environment) in self.world.lights.environments.iter().enumerate() {
             let source = self.sample_environment(index, interaction.direct_mask | glossy.lanes);
             let light = &source.light;
             let arrives = interaction.geometric.dot(light.wi).gt(L::zero());
             let rays = source.visible.then_some(glossy);
-            let value = self
-                .reflected(light, arrives, rays, |pdf| pdf * power_heuristic(light.density, pdf));
+            let value =
+                self.reflected(light, arrives, rays, |pdf| power_heuristic(light.density, pdf));
             self.add_environment(environment, light.wi, value.component_mul(light.irradiance));
-            if is_diffuse.any() {
-                self.add_cosine_sample(index, environment, is_diffuse);
+            if interaction.direct_mask.any() {
+                self.add_cosine_sample(index, environment);
             }
         }
     }
@@ -81,25 +80,26 @@ impl<L: SimdFloat> Vertex<'_, L> {
         source.with_light(source.light.sample(numbers, lanes))
     }
 
-    /// Adds the light of an environment from a cosine-weighted direction (third strategy), in
-    /// `lanes`.
+    /// Adds the light of an environment from a cosine-weighted direction (third strategy).
     #[inline(always)]
-    fn add_cosine_sample(
-        &mut self,
-        index: usize,
-        environment: &EnvironmentSource<L::Scalar>,
-        lanes: L::Mask,
-    ) {
+    fn add_cosine_sample(&mut self, index: usize, environment: &EnvironmentSource<L::Scalar>) {
         let interaction = self.interaction;
         let salt = ENVIRONMENT_SALT + 2 * index as u32 + 1;
         let (u, v) = self.sampler.light_2d(self.bounce, salt);
         let local = warp::cosine_hemisphere(u, v);
         let cos = local.z;
         let wi = Frame::around(interaction.normal).to_world(local).renormalize();
-        let arrives = lanes & interaction.geometric.dot(wi).gt(L::zero()) & cos.gt(L::zero());
+        let faces = interaction.geometric.dot(wi).gt(L::zero()) & cos.gt(L::zero());
+        let arrives = interaction.direct_mask & faces;
         let (radiance, pdf) = environment.light.radiance(wi, arrives);
-        let weight = power_heuristic(cosine_pdf(cos), pdf).masked(arrives);
-        let value = interaction.diffuse.component_mul(radiance) * weight;
+        let density = cosine_pdf(cos);
+        let mut value = interaction.diffuse;
+        for (index, lanes) in interaction.bsdfs(interaction.highlight_mask & arrives) {
+            let highlight = self.world.bsdfs[index].highlight(&self.query(), wi);
+            value += (highlight * (L::one() / density)).masked(lanes);
+        }
+        let weight = power_heuristic(density, pdf);
+        let value = value.component_mul(radiance) * weight;
         self.add_environment(environment, wi, value.masked(arrives));
     }
 
