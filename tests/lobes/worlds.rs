@@ -104,7 +104,7 @@ fn packets_equal_samples_traced_alone() {
     }
     let glass = ["glass.toml", "transmission.toml", "water-glass.toml"]
         .map(|file| (file, sized(shipped(file), [24, 20])));
-    // Mirrors and matt surfaces side by side, in packets that offer different numbers of hits.
+    // Mirrors and matte surfaces side by side, in packets that offer different numbers of hits.
     let mut bounce = mirror.clone();
     bounce.trace.max_diffuse_depth = 1;
     let others = [

@@ -106,6 +106,9 @@ impl<S: Float> Culling<S> {
     }
 }
 
+/// Largest number of pairs of a light and a primitive for which occluders are culled.
+const MAX_PAIRS: usize = 1 << 24;
+
 /// Culling by view frusta and by the space between visible surfaces and the lights.
 pub(crate) struct FrustumCuller {
     bounds: Vec<BoundingVolume>,
@@ -155,6 +158,8 @@ impl FrustumCuller {
         };
         let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
         let primary = geometry.select(|primitive| parts[primitive as usize].is_some());
+        let LightBounds { delta_lights, emitters, strata, .. } = &self.lights;
+        let is_large = (delta_lights.len() + emitters.len()) * parts.len() > MAX_PAIRS;
         // Primitives that can occlude the light from a visible part of some primitive.
         let occluders_of = |light: &LightTarget| {
             geometry.select(|primitive| {
@@ -165,10 +170,9 @@ impl FrustumCuller {
                             && self.bounds[primitive].may_occlude(&part, light)
                     })
                 };
-                parts.iter().enumerate().any(may_occlude_part)
+                is_large || parts.iter().enumerate().any(may_occlude_part)
             })
         };
-        let LightBounds { delta_lights, emitters, strata, .. } = &self.lights;
         let [delta_lights, emitters, strata] = [delta_lights, emitters, strata]
             .map(|lights| lights.iter().map(occluders_of).collect());
         let occluders = Occluders { delta_lights, emitters, strata };
