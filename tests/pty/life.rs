@@ -99,9 +99,9 @@ fn without_terminal_one_line_names_the_alternative() {
 #[test]
 fn missing_file_is_reported_without_dashboard() {
     let fixture = Fixture::new();
-    let (status, bytes) = fixture.open(&["nowhere.toml"], [80, 24]).end();
+    let (status, bytes) = fixture.open(&["nowhere/scene.toml"], [80, 24]).end();
     assert_eq!(status, 1);
-    assert!(bytes.contains("nowhere.toml") && !bytes.contains(ENTER), "{bytes:?}");
+    assert!(bytes.contains("nowhere/scene.toml") && !bytes.contains(ENTER), "{bytes:?}");
 }
 
 #[test]

@@ -260,7 +260,10 @@ impl FramePipeline {
         self.removing |= !std::mem::take(&mut self.removal).is_empty();
         bytes.extend(std::mem::take(&mut self.clipboard).as_bytes());
         if self.link[0] != self.link[1] {
-            bytes.extend(self.link[0].as_deref().unwrap_or_default().as_bytes());
+            if let Some(link) = &self.link[0] {
+                bytes.extend(link.as_bytes());
+                self.diff.pen_reset();
+            }
             self.link[1] = self.link[0].clone();
         }
         bytes.extend(self.flow.ack_request().unwrap_or_default().as_bytes());
@@ -367,7 +370,7 @@ impl FramePipeline {
     }
 
     /// Returns the sequence that makes the path in the notice of an export a link; `None` without
-    /// such a notice. It restores the cursor and the colours.
+    /// such a notice. It resets the colours.
     fn link_to_export(&self, model: &Model) -> Option<String> {
         let environment = &self.terminal.environment;
         let is_able =
@@ -382,6 +385,6 @@ impl FramePipeline {
             self.target.cell((x, y)).is_some_and(|cell| cell.symbol().chars().eq([c]))
         });
         let link = is_shown.then(|| hyperlink(&paths::url(path), &text))?;
-        Some(format!("\x1b7\x1b[{};{}H\x1b[0;4m{link}\x1b8", y + 1, x + 1))
+        Some(format!("\x1b[{};{}H\x1b[0;4m{link}\x1b[m", y + 1, x + 1))
     }
 }

@@ -279,9 +279,10 @@ impl UpdateContext<'_> {
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
             Ok(Exported { path, description, advice, is_image }) => {
-                let later =
-                    if is_image && self.improves() { "  ·  Alt-p: when converged" } else { "" };
-                let text = format!("{}  {description}{later}  ·  {advice}", path.display());
+                let later = if self.improves() { ", Alt-p: when converged" } else { "" };
+                let shown =
+                    if is_image { format!("o shows it{later}  ·  ") } else { String::new() };
+                let text = format!("{}  {description}  ·  {shown}{advice}", path.display());
                 if is_image {
                     self.model.last_export = Some(path);
                 }

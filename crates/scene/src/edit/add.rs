@@ -229,7 +229,7 @@ fn luminance(Color([red, green, blue]): Color) -> f64 {
 
 /// Brightness of a white diffuse surface that faces the first light. Surfaces of usual albedos at
 /// usual angles then have about the level 90 of 255.
-const EXPOSURE: f64 = 1.25;
+const EXPOSURE: f64 = 1.0;
 
 #[cfg(test)]
 mod tests {

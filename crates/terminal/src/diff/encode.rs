@@ -55,6 +55,11 @@ impl Encoder {
         self.cursor = None;
     }
 
+    /// Records that other output has reset colours and attributes.
+    pub fn pen_reset(&mut self) {
+        self.pen = Pen::default();
+    }
+
     /// Moves the cursor to column `x` and row `y`.
     pub fn go(&mut self, out: &mut Vec<u8>, x: u16, y: u16) {
         let before = self.cursor.replace((x, y));

@@ -102,6 +102,12 @@ impl FrameDiff {
         }
     }
 
+    /// Records that other output has reset colours and attributes, and moved the cursor.
+    pub fn pen_reset(&mut self) {
+        self.moved();
+        self.encoder.pen_reset();
+    }
+
     /// Appends the bytes of the next frame to `out`, within `allowance`. Appends nothing if the
     /// terminal shows `target` already. OKLab differences up to `threshold` are invisible.
     pub fn frame(

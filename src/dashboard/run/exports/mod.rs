@@ -52,7 +52,7 @@ impl Exporter {
         let noise = noise.map_or("unknown".to_string(), |n| format!("{:.2} levels", n.rmse.levels));
         Ok(Exported {
             description: format!("{width}x{height}  {spp:.0} spp  noise {noise}"),
-            advice: format!("scp {} .  ·  o shows it, y copies the path", scp(&path)),
+            advice: format!("scp {} .", scp(&path)),
             path,
             is_image: true,
         })
