@@ -8,10 +8,14 @@ use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
     SrgbRenderingIntent, Writer,
 };
+use rayon::prelude::*;
 use std::io::{self, Write};
+use std::ops::Range;
 
 /// Largest number of bytes of image data in a chunk.
 const CHUNK_BYTES: usize = 1 << 18;
+/// Number of rows that are encoded together.
+const STRIP_ROWS: usize = 64;
 /// Number of bytes of the last chunk, which has no data.
 const END_CHUNK_BYTES: usize = 12;
 
@@ -36,10 +40,14 @@ fn encode_to(
 ) -> Result<(), EncodingError> {
     let mut writer = start(header, depth, &header.metadata, &mut *sink)?;
     let mut stream = writer.stream_writer_with_size(CHUNK_BYTES)?;
-    let mut row = Vec::new();
-    for y in 0..header.film.height {
-        encode_row(header, depth, bands.film_with_row(y)?, y, &mut row);
-        stream.write_all(&row)?;
+    let mut y = 0;
+    while y < header.film.height {
+        let film = bands.film_with_row(y)?;
+        let rows = y..(y + STRIP_ROWS).min(film.first_row + film.header.height);
+        y = rows.end;
+        for row in encode_rows(header, depth, film, rows) {
+            stream.write_all(&row)?;
+        }
     }
     stream.finish()?;
     writer.finish()?;
@@ -123,19 +131,28 @@ pub fn png_of_rgb(
     Ok(bytes)
 }
 
-/// Replaces `bytes` by the encoded row `y`. 16-bit levels are big-endian.
-fn encode_row(header: &FilmFileHeader, depth: Depth, film: &Film, y: usize, bytes: &mut Vec<u8>) {
-    let row = film.row(y - film.first_row, Replicates::Both, &header.weights);
-    bytes.clear();
-    match depth {
-        Depth::Eight => {
-            let to_8 = header.display.to_8();
-            row.iter().for_each(|rgb| bytes.extend(to_8(*rgb)));
+/// Encodes rows of the picture, on the threads of the current pool if there is one. 16-bit levels
+/// are big-endian.
+fn encode_rows(
+    header: &FilmFileHeader,
+    depth: Depth,
+    film: &Film,
+    rows: Range<usize>,
+) -> Vec<Vec<u8>> {
+    let to_8 = header.display.to_8();
+    let encode = |y: usize| -> Vec<u8> {
+        let row = film.row(y - film.first_row, Replicates::Both, &header.weights);
+        match depth {
+            Depth::Eight => row.into_iter().flat_map(&to_8).collect(),
+            Depth::Sixteen => row
+                .into_iter()
+                .flat_map(|rgb| header.display.levels(rgb))
+                .flat_map(|value| quantised_16(value).to_be_bytes())
+                .collect(),
         }
-        Depth::Sixteen => bytes.extend(
-            row.iter()
-                .flat_map(|rgb| header.display.levels(*rgb))
-                .flat_map(|value| quantised_16(value).to_be_bytes()),
-        ),
+    };
+    match rayon::current_thread_index() {
+        Some(_) => rows.into_par_iter().map(encode).collect(),
+        None => rows.map(encode).collect(),
     }
 }

@@ -173,13 +173,16 @@ impl Worker {
         }
         let work = self.work.as_ref().ok().and_then(Option::as_ref);
         let film = work.map(|work| (work, work.report(&self.context, self.state.clone())));
+        let pool = &self.context.pool;
         for task in tasks {
-            task(film.as_ref().map(|(work, report)| Picture {
+            let picture = film.as_ref().map(|(work, report)| Picture {
                 film: &work.state.film,
                 weights: &work.state.weights,
                 report,
-                source: Source::Render(work, &self.context.pool),
-            }));
+                source: Source::Render(work, pool),
+            });
+            // The encoders of picture files use the threads of the pool in which they run.
+            pool.install(|| task(picture));
         }
     }
 

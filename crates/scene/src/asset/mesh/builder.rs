@@ -1,11 +1,11 @@
 //! Builder of meshes. The parser of a file format adds vertices and triangles to it. The builder
-//! then checks them, and removes triangles without area.
+//! then checks them, and removes triangles without area and all but one of equal triangles.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, polygon};
 use glam::DVec3;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Largest absolute value of a mesh coordinate.
@@ -218,7 +218,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Checks the mesh and returns it as a [`TriangleMesh`], without the triangles whose area is 0.
+    /// Checks the mesh and returns it as a [`TriangleMesh`], without the triangles whose area is 0
+    /// or that equal another one.
     pub fn finish(mut self) -> Result<TriangleMesh, AssetError> {
         self.check_limits(0, 0)?;
         let source = self.source;
@@ -234,6 +235,7 @@ impl<'a> Builder<'a> {
             .collect();
         self.positions = Vec::new();
         self.drop_flat(&positions)?;
+        self.drop_equal(&positions);
         let corners = self.triangles.iter().flatten().map(|i| positions[*i as usize]);
         let [low, high] = bounds(corners.map(|p| p.map(f64::from)));
         let extent = (high - low).max_element();
@@ -279,23 +281,59 @@ impl<'a> Builder<'a> {
         if is_far { 0.5 * (low + high) } else { DVec3::ZERO }
     }
 
-    /// Removes triangles whose area is 0 from the mesh, and adds a note with their number.
+    /// Removes triangles whose area is 0.
     fn drop_flat(&mut self, positions: &[[f32; 3]]) -> Result<(), AssetError> {
         let before = self.triangles.len();
         let has_area = |t: &[u32; 3]| {
             let p = t.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
             (p[1] - p[0]).cross(p[2] - p[0]) != DVec3::ZERO
         };
-        let mut kept = self.triangles.iter().map(has_area);
-        self.color_of.retain(|_| kept.next().unwrap_or(true));
-        self.triangles.retain(has_area);
-        let dropped = before - self.triangles.len();
+        let keep = self.triangles.iter().map(has_area).collect();
+        self.retain(keep, "a triangle without area was left out");
         if self.triangles.is_empty() {
             let found = format!("none of the {before} triangles has an area");
             return Err(self.source.fault(found, "at least one that has"));
         }
-        self.note_times("a triangle without area was left out".to_string(), dropped);
         Ok(())
+    }
+
+    /// Removes triangles whose corners are those of an earlier one, in the same sense of rotation.
+    /// No hierarchy can divide equal triangles: each ray would test them all.
+    fn drop_equal(&mut self, positions: &[[f32; 3]]) {
+        let corners = |t: &[u32; 3]| {
+            // Negative zeros equal positive ones.
+            let mut corners = t.map(|i| positions[i as usize].map(|x| (x + 0.0).to_bits()));
+            let least = (0..3).min_by_key(|i| corners[*i]).unwrap_or(0);
+            corners.rotate_left(least);
+            corners
+        };
+        let hash = |corners: &[[u32; 3]; 3]| {
+            corners.as_flattened().iter().fold(0, |hash: u64, bits| {
+                (hash ^ u64::from(*bits)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
+            })
+        };
+        // Most meshes have no equal triangles. Only those of hashes that occur twice are compared.
+        let slots = 8 * self.triangles.len().next_power_of_two();
+        let slot = |t: &[u32; 3]| (hash(&corners(t)) >> (64 - slots.ilog2())) as usize;
+        let mut count = vec![0_u8; slots];
+        for slot in self.triangles.iter().map(slot) {
+            count[slot] = count[slot].saturating_add(1);
+        }
+        let mut first = HashSet::new();
+        let keep = |t: &[u32; 3]| count[slot(t)] == 1 || first.insert(corners(t));
+        let keep = self.triangles.iter().map(keep).collect();
+        self.retain(keep, "a triangle that equals another one was left out");
+    }
+
+    /// Keeps the triangles for which `keep` has `true`, and notes the number of the others.
+    fn retain(&mut self, keep: Vec<bool>, note: &str) {
+        let dropped = keep.iter().filter(|keep| !**keep).count();
+        if dropped > 0 {
+            let [mut of_triangle, mut of_color] = [keep.iter(), keep.iter()];
+            self.triangles.retain(|_| of_triangle.next() == Some(&true));
+            self.color_of.retain(|_| of_color.next() == Some(&true));
+            self.note_times(note.to_string(), dropped);
+        }
     }
 
     /// Returns a unit normal for each vertex; `None` if no vertex has a normal in the file. Corners

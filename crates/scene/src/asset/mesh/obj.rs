@@ -346,7 +346,8 @@ mod tests {
             ("mtllib ../x.mtl\n", "no colours: \"../x.mtl\" is not in the mesh's folder"),
             ("f 1 2\nf 1\n", "a face of fewer than three corners was left out (2 times)"),
             ("f 1 1 2\n", "a triangle without area was left out"),
-            ("vn 0 0 1\nf 1//1 2//1 3//1\n", "a normal that is missing was computed (6 times)"),
+            ("f 1 2 3\nf 3 1 2\n", "a triangle that equals another one was left out (2 times)"),
+            ("vn 0 0 1\nf 3//1 2//1 1//1\n", "a normal that is missing was computed (6 times)"),
             (
                 "v 0 1.5 0\nf 1 3 2 5\n",
                 "a polygon whose outline crosses itself or is too long is uncertain",
@@ -379,8 +380,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mtl = "newmtl red thing\nKd 1 0 0\nKs 1\nnewmtl grey\nKd 0.5\nnewmtl odd\nKd a b c\n";
         std::fs::write(folder.path().join("c.mtl"), mtl).unwrap();
-        let text = "mtllib c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red thing\nf 1 2 3\n\
-                    usemtl grey\nf 1 3 2\nusemtl odd\nf 2 3 1\nusemtl none\nf 2 1 3\n";
+        let text = "mtllib c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl red thing\nf 1 2 3\n\
+                    usemtl grey\nf 1 3 2\nusemtl odd\nf 1 2 4\nusemtl none\nf 1 4 2\n";
         let path = folder.path().join("a.obj");
         let mesh = parse(&FileContents { path, bytes: text.into() }).unwrap();
         let colors: Vec<_> = (0..4).map(|i| mesh.color(i).unwrap()).collect();

@@ -540,7 +540,7 @@ mod tests {
     fn ply_texture_coordinates_of_corners_are_kept() {
         let text = SQUARE.replace("end_header", "property list uchar float texcoord\nend_header");
         let text = text.replace("face 1", "face 3");
-        let faces = "4 0 1 2 3 8 0 0 1 0 1 1 0 1\n3 0 1 2 6 0 0 0.5 0 1 1\n3 0 2 3 0\n";
+        let faces = "4 0 1 2 3 8 0 0 1 0 1 1 0 1\n3 1 2 3 6 0 0 0.5 0 1 1\n3 1 3 0 0\n";
         let mesh = read(text.replace("4 0 1 2 3\n", faces).as_bytes()).unwrap();
         let uvs = mesh.uvs.unwrap();
         let of = |t: &[u32; 3]| t.map(|i| uvs[i as usize]);

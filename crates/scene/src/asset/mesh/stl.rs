@@ -183,10 +183,11 @@ mod tests {
     #[test]
     fn stl_texts_of_programs_are_read() {
         let whole = format!("solid a\n{FACET}endsolid a\n");
-        let line = whole.replace('\n', " ");
+        let other = whole.replace("vertex 0 1 0", "vertex 0 2 0");
+        let [line, other_line] = [&whole, &other].map(|text| text.replace('\n', " "));
         for (name, text, triangles) in [
             ("as it should be", whole.clone(), 1),
-            ("two solids", whole.repeat(2), 2),
+            ("two solids", format!("{whole}{other}"), 2),
             ("an empty solid before", format!("solid e\nendsolid e\n{whole}"), 1),
             ("upper case", whole.to_uppercase(), 1),
             ("mixed case", whole.replace("facet", "Facet").replace("outer", "OuTer"), 1),
@@ -196,11 +197,11 @@ mod tests {
             ("a name like words", whole.replace("solid a", "solid vertex facet end 1"), 1),
             ("no endsolid", format!("solid a\n{FACET}"), 1),
             ("two words", whole.replace("end", "end "), 1),
-            ("no endfacet", whole.replace("endfacet\n", "") + FACET, 2),
+            ("no endfacet", whole.replace("endfacet\n", "") + &FACET.replace("0 1 0", "0 2 0"), 2),
             ("CRLF", whole.replace('\n', "\r\n"), 1),
             ("CR", whole.replace('\n', "\r"), 1),
             ("one line", line.clone(), 1),
-            ("one line for two", line.repeat(2), 2),
+            ("one line for two", format!("{line}{other_line}"), 2),
             (
                 "a facet in a line",
                 whole.replace("\nouter", " outer").replace("\nvertex", " vertex"),
@@ -221,8 +222,8 @@ mod tests {
 
     #[test]
     fn stl_colors_are_noted() {
-        let mut bytes =
-            binary(&[[0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]; 2], 2);
+        let facet = |y| [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, y, 0.0];
+        let mut bytes = binary(&[facet(1.0), facet(2.0)], 2);
         assert_eq!(read(&bytes).unwrap().notes, [] as [String; 0]);
         bytes[133] = 0xFC;
         assert_eq!(read(&bytes).unwrap().notes, ["a colour of a triangle was not read"]);
