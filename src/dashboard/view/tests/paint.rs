@@ -58,7 +58,7 @@ fn paint() {
             make(&mut model);
             if let Some(before) = &model.snapshot {
                 let mut snapshot = picture.clone();
-                snapshot.probe = before.probe;
+                snapshot.probe = before.probe.clone();
                 snapshot.report = before.report.clone();
                 model.snapshot = Some(Box::new(snapshot));
             }
