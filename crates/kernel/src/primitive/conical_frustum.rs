@@ -333,9 +333,12 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for ConicalFrustum<L::Scalar> {
 impl<L: SimdFloat> SolidPrimitive<L> for ConicalFrustum<L::Scalar> {
     type Spans = Option<Span<L>>;
 
-    fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
+    fn spans(&self, ray: &Ray<L>, wanted: L::Mask) -> Option<Span<L>> {
         let s = self;
         let chord = chord(s, ray)?;
+        if (chord.meets & wanted).none() {
+            return None;
+        }
         let (enter, leave) = chord.distances();
         let cap = Vec3::splat(s.cap_normal).dot(ray.direction).abs();
         let cosine = |on_side: L::Mask, t: L| {

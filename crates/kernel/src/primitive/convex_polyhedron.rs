@@ -197,8 +197,11 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for ConvexPolyhedron<L::Scalar> {
 impl<L: SimdFloat> SolidPrimitive<L> for ConvexPolyhedron<L::Scalar> {
     type Spans = Option<Span<L>>;
 
-    fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
+    fn spans(&self, ray: &Ray<L>, wanted: L::Mask) -> Option<Span<L>> {
         let (enter, leave, meets) = self.chord(ray)?;
+        if (meets & wanted).none() {
+            return None;
+        }
         let from_center = ray.origin - Vec3::splat(self.center);
         // The entry is on the face whose plane is closest to it, among the faces that the line
         // crosses inwards. The exit is on the face whose plane is closest to it, among the faces

@@ -1,7 +1,7 @@
 //! Ellipsoids. Rays are transformed into the space of the unit sphere.
 
 use crate::bvh::Ray;
-use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, Projection, box_distance, frobenius_norm, normals_of_solid, rows,
@@ -149,8 +149,11 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for Ellipsoid<L::Scalar> {
 impl<L: SimdFloat> SolidPrimitive<L> for Ellipsoid<L::Scalar> {
     type Spans = Option<Span<L>>;
 
-    fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
+    fn spans(&self, ray: &Ray<L>, wanted: L::Mask) -> Option<Span<L>> {
         let (enter, leave, meets) = chord(self, ray)?;
+        if (meets & wanted).none() {
+            return None;
+        }
         let cosine = |t: L| self.surface(ray.at(t)).normal.dot(ray.direction).abs();
         let (enter_cosine, leave_cosine) = (cosine(enter), cosine(leave));
         Some(Span { enter, leave, enter_cosine, leave_cosine, meets })

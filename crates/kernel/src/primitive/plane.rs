@@ -91,7 +91,7 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for Plane<L::Scalar> {
 impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
     type Spans = Option<Span<L>>;
 
-    fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
+    fn spans(&self, ray: &Ray<L>, _wanted: L::Mask) -> Option<Span<L>> {
         let normal = Vec3::splat(self.normal);
         let speed = ray.direction.dot(normal);
         let height = ray.origin.dot(normal) - L::splat(self.offset);

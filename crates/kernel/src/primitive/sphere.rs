@@ -142,9 +142,12 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for Sphere<L::Scalar> {
 impl<L: SimdFloat> SolidPrimitive<L> for Sphere<L::Scalar> {
     type Spans = Option<Span<L>>;
 
-    fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
+    fn spans(&self, ray: &Ray<L>, wanted: L::Mask) -> Option<Span<L>> {
         let f = ray.origin - Vec3::splat(self.center);
         let (enter, leave, meets) = intersections(f, ray.direction, L::splat(self.radius2))?;
+        if (meets & wanted).none() {
+            return None;
+        }
         // The cosine is half the chord divided by the radius.
         let cosine = (leave - enter) * (L::from_f64(0.5) / L::splat(self.radius));
         Some(Span { enter, leave, enter_cosine: cosine, leave_cosine: cosine, meets })

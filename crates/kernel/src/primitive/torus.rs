@@ -416,7 +416,7 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for Torus<L::Scalar> {
 impl<L: SimdFloat> SolidPrimitive<L> for Torus<L::Scalar> {
     type Spans = std::iter::Flatten<std::option::IntoIter<[Span<L>; 2]>>;
 
-    fn spans(&self, ray: &Ray<L>) -> Self::Spans {
+    fn spans(&self, ray: &Ray<L>, _wanted: L::Mask) -> Self::Spans {
         spans(self, ray).into_iter().flatten()
     }
 }

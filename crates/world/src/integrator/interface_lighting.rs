@@ -140,10 +140,14 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let (world, light) = (self.world, &source.light);
         let height = light.wi.dot(self.interaction.geometric);
         let arrives = if side.behind { height.lt(L::zero()) } else { height.gt(L::zero()) };
+        let arrives = side.lanes & arrives & light.density.gt(L::zero());
+        if arrives.none() {
+            return;
+        }
         let BsdfValue { value, density } = rough.eval(self, &light.wi, side.behind);
         let weight = power_heuristic(light.density, density);
         let value = value.component_mul(light.irradiance) * weight;
-        let lit = side.lanes & arrives & value.max_element().gt(L::zero());
+        let lit = arrives & value.max_element().gt(L::zero());
         let occluded = |lit| {
             let (ray, t_max) = (Ray { origin: side.origin, direction: light.wi }, light.distance);
             let (emitters, geometry) = (&world.lights.emitters, &world.geometry);

@@ -38,7 +38,7 @@ pub fn padded((low, high): Bounds, epsilon: f64) -> [DVec3; 2] {
 /// Rounding error of a bounding box in double precision, as a fraction of the largest coordinate.
 /// Far from the scene file's origin, a solid may extend beyond its box by this error, because box
 /// and solid are rounded separately.
-const GIVEN: f64 = 1.0 / 4_294_967_296.0;
+pub const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> PrimitiveBox<S> {
     /// Returns the bounding box of a canonical form; `None` without finite bounds. If `oriented` is

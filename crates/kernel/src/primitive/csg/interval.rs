@@ -2,7 +2,6 @@
 //! transitions of the line between inside and outside.
 
 use crate::lanes::SimdFloat;
-use crate::primitive::csg::solid::Span;
 
 /// Lower limit of the cosine by which the tolerance of coincident faces is divided. It keeps the
 /// tolerance finite for lines parallel to the surface.
@@ -18,7 +17,8 @@ pub struct Event<L> {
     pub tie: L,
 }
 
-/// Interval of distances in which a line is inside a part of a compound.
+/// Interval of distances in which a line is inside a part of a compound. In lanes whose line misses
+/// the part, `enter` is `L::MAX` and `leave` is `-L::MAX`.
 #[derive(Clone, Copy)]
 pub struct Interval<L> {
     pub enter: L,
@@ -26,10 +26,30 @@ pub struct Interval<L> {
 }
 
 impl<L: SimdFloat> Interval<L> {
+    /// Returns the lanes whose line meets the part.
+    #[inline(always)]
+    pub fn meets(&self) -> L::Mask {
+        self.enter.le(self.leave)
+    }
+
     /// Returns the lanes in which `t` is in the interval.
     #[inline(always)]
     pub fn at(&self, t: L) -> L::Mask {
         self.enter.le(t) & self.leave.ge(t)
+    }
+
+    /// Returns start and end of the interval; both are `L::MAX` in lanes whose line misses the part.
+    /// `cosines` are those of the angles between line and surface normal. `tie` is the tolerance for
+    /// a line perpendicular to the face.
+    #[inline(always)]
+    pub fn events(&self, cosines: [L; 2], tie: L) -> [Event<L>; 2] {
+        let never = L::from_f64(L::MAX);
+        let end = |t: L, cosine: L| Event {
+            t,
+            tie: (tie / cosine.max(L::from_f64(FLATTEST))).masked(t.abs().lt(never)),
+        };
+        let leave = L::select(self.meets(), self.leave, never);
+        [end(self.enter, cosines[0]), end(leave, cosines[1])]
     }
 }
 
@@ -76,36 +96,26 @@ impl<L: SimdFloat> Transition<L> {
 }
 
 /// Calls `use_it` with a slice of `n` elements that equal `fill`. The slice is on the stack if `n`
-/// is at most `FEW`, otherwise on the heap.
+/// is at most `SOME`, otherwise on the heap.
 #[inline(always)]
-pub fn with_scratch<const FEW: usize, T: Copy, R>(
+pub fn with_scratch<const FEW: usize, const SOME: usize, T: Copy, R>(
     n: usize,
     fill: T,
     use_it: impl FnOnce(&mut [T]) -> R,
 ) -> R {
-    let (mut few, mut many) = ([fill; FEW], Vec::new());
+    // Only the array that is used is filled.
+    let (mut few, mut some, mut many);
     // A single call, so that the compiler inlines `use_it`.
     use_it(if n <= FEW {
+        few = [fill; FEW];
         &mut few[..n]
+    } else if n <= SOME {
+        some = [fill; SOME];
+        &mut some[..n]
     } else {
-        many.resize(n, fill);
+        many = vec![fill; n];
         &mut many
     })
-}
-
-/// Returns the start and the end of `span`; both are `L::MAX` in lanes whose line misses the solid.
-/// `tie` is the tolerance for a line perpendicular to the face.
-#[inline(always)]
-pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
-    let never = L::from_f64(L::MAX);
-    let end = |t: L, cosine: L| {
-        let real = span.meets & t.abs().lt(never);
-        Event {
-            t: L::select(span.meets, t, never),
-            tie: (tie / cosine.max(L::from_f64(FLATTEST))).masked(real),
-        }
-    };
-    [end(span.enter, span.enter_cosine), end(span.leave, span.leave_cosine)]
 }
 
 /// Inserts `end` into `ends`. The first `count` elements must be sorted by distance in each lane.

@@ -18,11 +18,13 @@ mod tree;
 pub use solid::{Solid, SolidPrimitive, Span};
 pub use tree::{CsgSolid, CsgTree};
 
+use crate::bvh::packet::SlabPacket;
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::canonical::CanonicalShape;
+use crate::primitive::aggregate::primitive_box::{GIVEN, padded};
+use crate::primitive::canonical::{Bounds, CanonicalShape, UNBOUNDED};
 use crate::primitive::compiled::{Primitive, SurfacePoint, TexCoord};
-use crate::primitive::csg::interval::{Event, Interval, Transition, events, insert, with_scratch};
+use crate::primitive::csg::interval::{Event, Interval, Transition, insert, with_scratch};
 use crate::primitive::csg::solid::CompiledSolid;
 use std::ops::Range;
 use std::sync::Arc;
@@ -31,6 +33,10 @@ use std::sync::Arc;
 /// rounding error of the largest coordinate. Two faces whose coordinates differ by four units in
 /// the last place are within this distance, although each is hit with a few rounding errors.
 const TIE: f64 = 16.0;
+
+/// Smallest number of parts of a compound whose bounding boxes are tested before the parts, and
+/// whose lines are tested for points inside before the ends of the spans are sorted.
+const MIN_BOXED: usize = 3;
 
 /// Instruction of a stack machine that computes whether a point is inside a compound. An entry of
 /// the stack is a mask of lanes.
@@ -46,8 +52,24 @@ enum Op {
     Minus,
 }
 
+/// Bounding box of a compound or of one of its parts; infinite if a part has no finite bounds.
+struct Extent<S> {
+    low: [S; 3],
+    high: [S; 3],
+}
+
+impl<S: Float> Extent<S> {
+    fn new(bounds: Option<Bounds>) -> Self {
+        let bounds = bounds.unwrap_or(UNBOUNDED);
+        let [low, high] =
+            padded(bounds, S::EPSILON.max(GIVEN)).map(|v| v.to_array().map(S::from_f64));
+        Self { low, high }
+    }
+}
+
 struct Part<S> {
     solid: CompiledSolid<S>,
+    extent: Extent<S>,
     /// `true` if the part is subtracted: the inside of its solid is outside the compound.
     reversed: bool,
     /// Range of the part's spans in the list of the spans of the compound.
@@ -60,6 +82,7 @@ struct Compound<S> {
     center: [S; 3],
     /// Squared radius of the bounding sphere.
     radius2: S,
+    extent: Extent<S>,
     reach: S,
     parts: Vec<Part<S>>,
     ops: Vec<Op>,
@@ -92,15 +115,17 @@ impl<S: Float> Compound<S> {
             let solid = CompiledSolid::new(part);
             let first = spans;
             spans += solid.max_spans();
-            Part { solid, reversed: false, spans: first..spans }
+            let extent = Extent::new(part.bounds());
+            Part { solid, extent, reversed: false, spans: first..spans }
         };
         let parts = form.parts.iter().map(part).collect();
-        let (low, high) = form.bounds().unwrap_or_default();
-        let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * S::EPSILON);
+        let bounds = form.bounds().unwrap_or_default();
+        let radius = 0.5 * bounds.0.distance(bounds.1) * (1.0 + 8.0 * S::EPSILON);
         let bounded = form.parts.iter().filter(|part| part.bounds().is_some());
         let mut compound = Self {
-            center: (0.5 * (low + high)).to_array().map(S::from_f64),
+            center: (0.5 * (bounds.0 + bounds.1)).to_array().map(S::from_f64),
             radius2: S::from_f64(radius * radius),
+            extent: Extent::new(Some(bounds)),
             reach: S::from_f64(bounded.map(|part| part.max_coordinate()).fold(0.0, f64::max)),
             parts,
             ops: Vec::new(),
@@ -156,29 +181,43 @@ impl<S: Float> Compound<S> {
         if near.none() {
             return;
         }
+        let packet = (self.parts.len() >= MIN_BOXED).then(|| {
+            let rounding = ray.origin.max_abs() * L::from_f64(4.0 * L::EPSILON);
+            SlabPacket::new(ray, Vec3::gray(rounding))
+        });
+        let boxed = |extent: &Extent<S>, lanes: L::Mask, limit: L| match &packet {
+            Some(packet) => {
+                lanes & packet.enters(Vec3::splat(extent.low), Vec3::splat(extent.high), limit)
+            }
+            None => lanes,
+        };
+        let near = boxed(&self.extent, near, hit.t);
+        if near.none() {
+            return;
+        }
         let (never, always) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
         let outside = Interval { enter: never, leave: always };
-        let end = Event { t: never, tie: L::zero() };
-        with_scratch::<8, _, _>(self.spans, outside, |spans| {
-            with_scratch::<16, _, _>(2 * self.spans, end, |ends| {
-                let tie =
-                    ray.origin.max_abs().max(L::splat(self.reach)) * L::from_f64(TIE * L::EPSILON);
-                let mut count = 0;
+        with_scratch::<6, 16, _, _>(self.spans, outside, |spans| {
+            with_scratch::<6, 16, _, _>(self.spans, [L::zero(); 2], |cosines| {
                 for part in &self.parts {
-                    let mut slots = spans[part.spans.clone()].iter_mut();
-                    part.solid.for_each_span(ray, |found| {
-                        let Some(span) = slots.next() else { return };
-                        *span = Interval {
-                            enter: L::select(found.meets, found.enter, never),
-                            leave: L::select(found.meets, found.leave, always),
+                    let wanted = boxed(&part.extent, near, never);
+                    if wanted.none() {
+                        continue;
+                    }
+                    let mut slot = part.spans.start;
+                    part.solid.for_each_span(ray, wanted, |found| {
+                        let meets = found.meets & wanted;
+                        spans[slot] = Interval {
+                            enter: L::select(meets, found.enter, never),
+                            leave: L::select(meets, found.leave, always),
                         };
-                        for end in events(&found, tie) {
-                            insert(end, ends, count);
-                            count += 1;
-                        }
+                        cosines[slot] = [found.enter_cosine, found.leave_cosine];
+                        slot += 1;
                     });
                 }
-                Lines { compound: self, first_id, spans }.sweep(&ends[..count], near, hit);
+                let tie =
+                    ray.origin.max_abs().max(L::splat(self.reach)) * L::from_f64(TIE * L::EPSILON);
+                Lines { compound: self, first_id, spans }.find(cosines, tie, near, hit);
             });
         });
     }
@@ -240,7 +279,7 @@ impl<L: SimdFloat> Lines<'_, L> {
         part: impl Fn(u32) -> T,
         join: impl Fn(Op, T, T) -> T,
     ) -> T {
-        with_scratch::<8, _, _>(self.compound.depth, empty, |stack| {
+        with_scratch::<3, 8, _, _>(self.compound.depth, empty, |stack| {
             let mut top = 0;
             for op in &self.compound.ops {
                 if let Op::Part(i) = op {
@@ -252,6 +291,20 @@ impl<L: SimdFloat> Lines<'_, L> {
                 }
             }
             stack[0]
+        })
+    }
+
+    /// Returns the lanes in which the line may have points inside the compound.
+    #[inline(always)]
+    fn reached(&self) -> L::Mask {
+        let meets = |i| {
+            let spans = self.spans_of(i).iter();
+            spans.fold(L::mask(false), |meets, span| meets | span.meets())
+        };
+        self.evaluate(L::mask(false), meets, |op, a, b| match op {
+            Op::Or => a | b,
+            Op::And => a & b,
+            Op::Part(_) | Op::Minus => a,
         })
     }
 
@@ -286,6 +339,28 @@ impl<L: SimdFloat> Lines<'_, L> {
             Op::And => a.and(b),
             Op::Part(_) | Op::Minus => a.and(b.inverted()),
         })
+    }
+
+    /// Replaces `hit` by the first surface of the compound in the lanes of `near` in which this
+    /// surface is nearer than `hit`. `cosines` are those of the angles between line and surface at
+    /// the ends of the spans. `tie` is the tolerance for a line perpendicular to a surface.
+    #[inline(always)]
+    fn find(&self, cosines: &[[L; 2]], tie: L, near: L::Mask, hit: &mut Hit<L>) {
+        let is_small = self.compound.parts.len() < MIN_BOXED;
+        let near = if is_small { near } else { near & self.reached() };
+        if near.none() {
+            return;
+        }
+        let spans = || self.spans.iter().zip(cosines);
+        let met = || spans().filter(|(span, _)| (near & span.meets()).any());
+        let end = Event { t: L::from_f64(L::MAX), tie: L::zero() };
+        with_scratch::<8, 32, _, _>(2 * met().count(), end, |ends| {
+            let events = met().flat_map(|(span, cosines)| span.events(*cosines, tie));
+            for (count, end) in events.enumerate() {
+                insert(end, ends, count);
+            }
+            self.sweep(ends, near, hit);
+        });
     }
 
     /// Replaces `hit` by the first surface of the compound in the lanes of `open` in which this

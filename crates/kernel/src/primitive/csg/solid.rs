@@ -33,8 +33,8 @@ pub trait SolidPrimitive<L: SimdFloat>: AnalyticPrimitive<L> {
     /// Collection of spans in ascending order, without overlap.
     type Spans: IntoIterator<Item = Span<L>>;
 
-    /// Returns the spans of the lines of a ray packet; none if no line hits the solid.
-    fn spans(&self, ray: &Ray<L>) -> Self::Spans;
+    /// Returns the spans of the lines of a ray packet; none if no line in `wanted` hits the solid.
+    fn spans(&self, ray: &Ray<L>, wanted: L::Mask) -> Self::Spans;
 }
 
 macro_rules! solids {
@@ -86,15 +86,17 @@ macro_rules! solids {
                 }
             }
 
-            /// Calls `use_it` for each span of the lines of a ray packet.
+            /// Calls `use_it` for each span of the lines of a ray packet, unless no line in
+            /// `wanted` hits the solid.
             #[inline(always)]
             pub fn for_each_span<L: SimdFloat<Scalar = S>>(
                 &self,
                 ray: &Ray<L>,
+                wanted: L::Mask,
                 use_it: impl FnMut(Span<L>),
             ) {
                 match self {
-                    $(Self::$kind(solid) => solid.spans(ray).into_iter().for_each(use_it),)+
+                    $(Self::$kind(solid) => solid.spans(ray, wanted).into_iter().for_each(use_it),)+
                 }
             }
 
