@@ -181,6 +181,7 @@ impl UpdateContext<'_> {
             ("w", "") => "save",
             ("wq", "") if is_edited => "save",
             ("q" | "wq", "") => "quit",
+            ("e", "") => "read the file again",
             _ => "",
         };
         let edits = self.model.watch.is_none() && !self.model.file.unreadable;
@@ -196,6 +197,10 @@ impl UpdateContext<'_> {
                 Ok(())
             }
             "w" if edits => self.save_to(rest.trim()),
+            "e" if self.model.watch.is_none() => {
+                self.open_scene_file(rest.trim());
+                Ok(())
+            }
             "set" if edits => self.set_typed(rest.trim()),
             _ => {
                 self.model.overlay = palette;
