@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zerkalo_scene::asset::Assets;
-use zerkalo_scene::{SceneErrors, SceneFile};
+use zerkalo_scene::{Recovery, SceneErrors, SceneFile};
 
 /// Text of a scene without objects.
 pub const NEW: &str = include_str!("new_scene.toml");
@@ -49,12 +49,13 @@ impl SceneSource {
     }
 }
 
-/// Returns `true` if `path` names a scene file that can be created: there is no such file, its
-/// extension is `toml`, and its folder exists.
+/// Returns `true` if `path` names a scene file that can be created: there is no such file, nor
+/// unsaved edits of it, its extension is `toml`, and its folder exists.
 pub fn is_new(path: &Path) -> bool {
     let missing = |error: std::io::Error| error.kind() == ErrorKind::NotFound;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     path.extension().is_some_and(|extension| extension == "toml")
         && path.symlink_metadata().is_err_and(missing)
+        && Recovery::new(Some(path), "", None).find().orphans.is_empty()
         && folder.unwrap_or(Path::new(".")).is_dir()
 }

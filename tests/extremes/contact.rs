@@ -121,10 +121,11 @@ impl Setting<'_> {
     /// Compares the scene of both shapes in contact with the scene with a gap, by `count` rays from
     /// above and `count` rays from below.
     fn check(&self, precision: Precision, count: usize) {
-        // An opaque surface that coincides with a clear pane gets no light through it.
-        let is_opaque = |material: &str| ["matte", "mirror"].contains(&material);
-        let (upper, lower) = (is_opaque(self.materials.0), is_opaque(self.materials.1));
-        if !upper && !is_solid(self.upper) && lower || !lower && !is_solid(self.lower) && upper {
+        // A surface that coincides with a clear pane gets no light through it.
+        let is_pane = |material: &str, shape: &str| {
+            !is_solid(shape) && !["matte", "mirror"].contains(&material)
+        };
+        if is_pane(self.materials.0, self.upper) || is_pane(self.materials.1, self.lower) {
             return;
         }
         let both_flat = !is_solid(self.upper) && !is_solid(self.lower);

@@ -220,6 +220,10 @@ fn check_files(folder: &Path, states: &[String], keys: &[usize]) -> Result<(), S
     }
     for entry in fs::read_dir(folder).map_err(|error| error.to_string())? {
         let path = entry.map_err(|error| error.to_string())?.path();
+        // The state folder has the list of recent scenes.
+        if path.is_dir() {
+            continue;
+        }
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let bytes = fs::read(&path).map_err(|error| error.to_string())?;
         let is_sound = match &*name {

@@ -201,7 +201,9 @@ fn closed_form_11_a_slab_with_all_orders() {
 
 #[test]
 fn rough_glass_converges_to_clear_glass() {
-    let scene = sized(shipped("rough-glass.toml"), [24, 16]);
+    let mut scene = sized(shipped("rough-glass.toml"), [24, 16]);
+    // Only a clear pane lets the light of lamps through.
+    scene.objects.retain(|object| !object.names_material("pane"));
     let with = |alpha: f64| {
         let mut scene = scene.clone();
         for material in scene.materials.values_mut().filter(|m| m.transmission > 0.0) {

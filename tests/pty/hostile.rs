@@ -35,7 +35,7 @@ fn names_with_control_sequences_are_escaped() {
     terminal.wait_for_text("not copied");
     // The file becomes invalid, and the error messages quote its text.
     terminal.send("]");
-    terminal.wait_for_text("toml ●");
+    terminal.wait_for_text("… ●");
     fs::write(fixture.path(&name), format!("[camera]\n\"{escaped}\" = 1\n")).unwrap();
     terminal.wait_for_text("keep my edits");
     terminal.send("r");

@@ -85,7 +85,7 @@ fn tiles_show_the_exported_picture() {
         |terminal: &Terminal| String::from_utf8_lossy(&terminal.bytes()).matches(removal).count();
     assert_eq!(count(&terminal), 0);
     terminal.send("\x1b[D");
-    terminal.wait_for_text("●");
+    terminal.wait_for_text("view, not the camera");
     while count(&terminal) == 0 {
         assert!(Instant::now() < until, "the tiles stay");
         std::thread::sleep(Duration::from_millis(20));

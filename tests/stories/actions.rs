@@ -305,7 +305,7 @@ fn file_stories() -> Vec<Story> {
         }),
         story("read the file again", "Ctrl-o", |_, d| d.asked(|e| *e == Effect::Load)),
         story("recover edits of a crashed session", ":", |_, d| d.notice().contains("No session")),
-        story("new scene", "Left Ctrl-n", |_, d| d.model.next_scene == Some(SceneSource::New)),
+        story("new scene", "] Ctrl-n", |_, d| d.model.next_scene == Some(SceneSource::New)),
         story(
             "open another scene",
             "O",

@@ -41,7 +41,7 @@ fn new_file_becomes_a_lit_scene_and_a_picture_in_seventy_keys() {
 #[test]
 fn another_scene_opens_after_unsaved_edits_are_saved_or_discarded() {
     let mut desk = Desk::new(ROOM);
-    desk.keys("Left Ctrl-n");
+    desk.keys("] Ctrl-n");
     assert!(matches!(desk.model.overlay, Some(Overlay::Question(_))));
     desk.keys("Esc");
     assert!(desk.model.is_unsaved() && desk.model.next_scene.is_none());
@@ -64,7 +64,7 @@ fn banner_of_a_broken_file_goes_when_the_file_is_good_again() {
     assert!(desk.model.file.broken.is_some() && desk.notice().contains("not TOML"));
     desk.send(Message::MendedOnDisk);
     assert!(desk.model.file.broken.is_none());
-    desk.keys("Left");
+    desk.keys("]");
     desk.send(Message::BrokenOnDisk(errors()));
     desk.send(Message::ChangedOnDisk);
     desk.keys("`k`");

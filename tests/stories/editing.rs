@@ -83,7 +83,7 @@ fn vector_or_colour_can_be_typed_into_any_component() {
     let Shape::Sphere(sphere) = &desk.scene().objects[1].shape else { panic!() };
     assert_eq!(sphere.center, [1.0, 2.0, -3.0]);
     desk.select(Target::Material("red".into()));
-    desk.keys("Home Down Down `#ffffff` Enter");
+    desk.keys("Home Down Down Down `#ffffff` Enter");
     assert_eq!(desk.scene().materials["red"].color.0, [1.0; 3]);
 }
 

@@ -213,9 +213,10 @@ fn drag_over_a_number_steps_it() {
     let mut desk = Desk::new(ROOM);
     desk.select(Target::Material("mirror".into()));
     let (rows, _) = desk.model.inspector_rows().unwrap();
-    desk.drag(Button::Left, [rows.x + 1, rows.y], [1, 0]);
+    let number = [rows.x + 1, rows.y + 1];
+    desk.drag(Button::Left, number, [1, 0]);
     assert_eq!(desk.text(), ROOM, "a click that slips");
-    desk.drag(Button::Left, [rows.x + 1, rows.y], [3, 0]);
+    desk.drag(Button::Left, number, [3, 0]);
     assert_eq!(desk.scene().materials["mirror"].roughness, 0.06);
     desk.keys("u");
     assert_eq!(desk.text(), ROOM, "one step");

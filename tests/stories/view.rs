@@ -36,7 +36,7 @@ fn view_follows_edits_of_the_camera() {
     desk.keys("Left Enter Right");
     assert!(desk.model.free_view.is_none() && eye(&desk) == [0.1, 1.0, 5.0], "{:?}", eye(&desk));
     // The lens is that of the camera, and undo closes both.
-    desk.keys("Esc Left *");
+    desk.keys("Esc Left Alt-o");
     let [seen, own] = [desk.model.seen(), desk.model.scene()].map(|s| s.camera.lens_radius());
     assert!(desk.model.free_view.is_some() && seen > 0.0 && seen == own, "{seen} {own}");
     desk.keys("u");

@@ -174,7 +174,7 @@ fn texture_edits_read_each_file_once() {
     assert!(written.starts_with("# A ball.\n") && written.contains("# white"), "{written}");
     assert!(
         written.contains(
-            "texture.image = { file = \"a.png\", mapping = \"planar\", scale = [4.0, 1.8], offset = [0.05, 0.0] }"
+            "texture.image = { file = \"a.png\", mapping = \"planar\", scale = [4.0, 1.6], offset = [0.05, 0.0] }"
         ),
         "{written}"
     );

@@ -42,8 +42,11 @@ fn encode_to(
     let mut stream = writer.stream_writer_with_size(CHUNK_BYTES)?;
     let mut y = 0;
     while y < header.film.height {
-        let film = bands.film_with_row(y)?;
+        let mut film = bands.film_with_row(y)?;
         let rows = y..(y + STRIP_ROWS).min(film.first_row + film.header.height);
+        for y in rows.clone().skip(1) {
+            film = bands.film_with_row(y)?;
+        }
         y = rows.end;
         for row in encode_rows(header, depth, film, rows) {
             stream.write_all(&row)?;
