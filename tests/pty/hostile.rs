@@ -37,8 +37,6 @@ fn names_with_control_sequences_are_escaped() {
     terminal.send("]");
     terminal.wait_for_text("… ●");
     fs::write(fixture.path(&name), format!("[camera]\n\"{escaped}\" = 1\n")).unwrap();
-    terminal.wait_for_text("keep my edits");
-    terminal.send("r");
     terminal.wait_for_text("nknown");
     terminal.send("\x03");
     terminal.wait_for_text("discard them and quit");

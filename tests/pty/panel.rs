@@ -63,9 +63,7 @@ fn tiles_show_the_exported_picture() {
     };
     let mut terminal = Terminal::start_with(&start, &[KITTY, CELL]);
     terminal.wait_for_text(" spp");
-    wait_for_picture(&terminal);
-    terminal.send(" ");
-    terminal.wait_for_text("paused");
+    terminal.wait_for_text("converged");
     terminal.send("p");
     terminal.wait_for_text("o shows it");
     let file = Picture::of_png(&fs::read(fixture.path("room-1.png")).unwrap());

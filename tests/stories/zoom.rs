@@ -31,7 +31,8 @@ fn zoom_shows_a_window_of_the_film() {
     desk.click(x, y);
     assert_eq!(desk.model.selection, Target::Object(1), "the ball");
     // Drags and arrows pan, and leave the camera alone.
-    desk.drag(Button::Left, [layout.image.x + 2, layout.image.y + 8], [8, -4]);
+    desk.select(Target::Camera);
+    desk.drag(Button::Left, [x, y], [8, -4]);
     let moved = window(&desk).origin;
     assert_eq!(moved, [320 - size[0] / 2 - 4, 240 - size[1] / 2 + 4]);
     desk.keys("Left Up");
