@@ -159,7 +159,7 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
     shape.rotate_y(rounded_to((heading(toward) - heading(front)) / 5.0, 0) * 5.0);
 }
 
-/// Adds a white light of the kind `kind`; see [`add_light_as`].
+/// Adds a white light of the kind `kind`.
 ///
 /// # Errors
 /// Fails if there is no such kind.

@@ -46,7 +46,7 @@ pub enum ReflectionLobe<S> {
     Cone {
         /// 1 - cos of the cone's half-angle.
         one_minus_cos: S,
-        /// 1 - cos of the half-angle of the cone of [`evaluated_roughness`].
+        /// 1 - cos of the half-angle of the cone of `evaluated_roughness`.
         evaluated: S,
     },
     /// Directions through uniform points of a square that is perpendicular to the axis and centred
@@ -54,7 +54,7 @@ pub enum ReflectionLobe<S> {
     Square {
         /// Side length of the square.
         side: S,
-        /// Side length of the square of [`evaluated_roughness`].
+        /// Side length of the square of `evaluated_roughness`.
         evaluated: S,
     },
     /// Reflection and refraction at visible microfacets.

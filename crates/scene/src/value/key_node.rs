@@ -78,7 +78,7 @@ pub trait KeyNode {
         self.child_mut(key)
     }
 
-    /// Returns a table with the values that omitted keys have by the key [`PRESET`]; `None` if they
+    /// Returns a table with the values that omitted keys have by the key `preset`; `None` if they
     /// have their declared defaults.
     fn base(&self) -> Option<Box<dyn KeyNode>> {
         None

@@ -134,7 +134,8 @@ mod tests {
     #[test]
     fn dark_hues_are_kept_before_greys() {
         // Frame, floor and ball of the opening scene, in the shade.
-        let cases: [([u8; 3], fn([u8; 3]) -> bool); 3] = [
+        type IsHue = fn([u8; 3]) -> bool;
+        let cases: [([u8; 3], IsHue); 3] = [
             ([84, 54, 26], |[r, g, b]| r > g && g >= b),
             ([96, 72, 50], |[r, g, b]| r >= g && g > b),
             ([80, 28, 30], |[r, g, b]| r > g && g == b),
