@@ -87,31 +87,7 @@ impl<L: SimdFloat> ShearedRay<L> {
     /// In a [`thin`](Mesh::thin) mesh `t` comes from the triangle's plane, because the areas at the
     /// edges have an error of their length squared.
     #[inline(always)]
-    fn intersect(&self, corners: [Vec3<L>; 3], thin: bool) -> (L, L::Mask) {
-        if thin {
-            return self.intersect_thin(corners);
-        }
-        let (p, [u, v, w], inside) = self.project(corners);
-        // The t of an edge-on triangle, without area, is 0 / 0, which counts as no hit.
-        let t = (u * p[0].z + v * p[1].z + w * p[2].z) / (u + v + w);
-        (t, inside & t.gt(L::zero()))
-    }
-
-    #[inline(never)]
-    fn intersect_thin(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
-        let (p, _, inside) = self.project(corners);
-        if inside.none() {
-            return (L::zero(), inside);
-        }
-        let normal = (p[1] - p[0]).exact_cross(p[2] - p[0]);
-        let t = normal.dot(p[0]) / normal.z;
-        (t, inside & t.gt(L::zero()))
-    }
-
-    /// Returns the corners in the frames of the rays, the areas that the edges span with the origin,
-    /// and the lanes whose line meets the triangle.
-    #[inline(always)]
-    fn project(&self, corners: [Vec3<L>; 3]) -> ([Vec3<L>; 3], [L; 3], L::Mask) {
+    fn intersect<const THIN: bool>(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
         let p = corners.map(|c| self.frame.to_local(c - self.origin));
         // The products are rounded separately, without fused multiply-add, so that the difference
         // never has the wrong sign.
@@ -120,7 +96,18 @@ impl<L: SimdFloat> ShearedRay<L> {
         let zero = L::zero();
         let left = u.ge(zero) & v.ge(zero) & w.ge(zero);
         let right = u.le(zero) & v.le(zero) & w.le(zero);
-        (p, [u, v, w], left | right)
+        let inside = left | right;
+        if THIN {
+            if inside.none() {
+                return (zero, inside);
+            }
+            let normal = (p[1] - p[0]).exact_cross(p[2] - p[0]);
+            let t = normal.dot(p[0]) / normal.z;
+            return (t, inside & t.gt(zero));
+        }
+        // The t of an edge-on triangle, without area, is 0 / 0, which counts as no hit.
+        let t = (u * p[0].z + v * p[1].z + w * p[2].z) / (u + v + w);
+        (t, inside & t.gt(zero))
     }
 
     /// Returns the corners of consecutive triangles of a leaf, one triangle per lane. The first one
@@ -134,12 +121,13 @@ impl<L: SimdFloat> ShearedRay<L> {
     }
 }
 
-/// Traversal of a mesh's BVH. If `ANY` is `true`, a ray ends at the first triangle found.
-struct MeshTraversal<'a, const ANY: bool> {
+/// Traversal of a mesh's BVH. If `ANY` is `true`, a ray ends at the first triangle found. `THIN` is
+/// the mesh's [`thin`](Mesh::thin): as a constant it costs other meshes nothing.
+struct MeshTraversal<'a, const ANY: bool, const THIN: bool> {
     mesh: &'a Mesh,
 }
 
-impl<const ANY: bool> MeshTraversal<'_, ANY> {
+impl<const ANY: bool, const THIN: bool> MeshTraversal<'_, ANY, THIN> {
     /// Traverses the mesh's BVH with the packet as a whole.
     #[inline(always)]
     fn traverse_as_packet<L: SimdFloat>(
@@ -155,7 +143,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             return found;
         }
         let bounds = PacketBounds::around(packet, wanted);
-        let (boxes, thin) = (&self.mesh.boxes, self.mesh.thin);
+        let boxes = &self.mesh.boxes;
         let leaf = |number: usize, _| {
             let leaf = &self.mesh.leaves[number];
             let first = self.mesh.firsts[number];
@@ -178,8 +166,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                     let broadcast_corner = |c: &[[f32; BVH_WIDTH]; 3]| {
                         Vec3::new(broadcast(c[0][i]), broadcast(c[1][i]), broadcast(c[2][i]))
                     };
-                    let (t, hit_mask) =
-                        sheared_ray.intersect(leaf.corners.each_ref().map(broadcast_corner), thin);
+                    let corners = leaf.corners.each_ref().map(broadcast_corner);
+                    let (t, hit_mask) = sheared_ray.intersect::<THIN>(corners);
                     let tie = hit_mask & t.le(found.t);
                     if tie.none() {
                         continue;
@@ -227,13 +215,13 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         for (lane, found) in found.iter_mut().enumerate().take(L::WIDTH) {
             *found = (limit.lane(lane), 0);
         }
-        let thin = self.mesh.thin;
         let leaf = |lane: usize, number: usize, limit: L::Scalar| {
             let leaf = &self.mesh.leaves[number];
             let sheared_ray = ShearedRay::<L>::only(&rays[lane]);
             let (best, triangle) = &mut found[lane];
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
-                let (t, hit_mask) = sheared_ray.intersect(ShearedRay::corners(leaf, part), thin);
+                let corners = ShearedRay::corners(leaf, part);
+                let (t, hit_mask) = sheared_ray.intersect::<THIN>(corners);
                 let mut bits = (hit_mask & t.le(L::splat(*best))).bits() & valid_lanes();
                 while bits != 0 {
                     let lane = bits.trailing_zeros();
@@ -265,13 +253,20 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
 /// the triangle with the lowest number. Lanes with a limit of 0 or less are inactive.
 #[inline(never)]
 pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
-    MeshTraversal::<false> { mesh }.run(ray, limit)
+    match mesh.thin {
+        true => MeshTraversal::<false, true> { mesh }.run(ray, limit),
+        false => MeshTraversal::<false, false> { mesh }.run(ray, limit),
+    }
 }
 
 /// Returns the lanes whose ray hits a triangle of the mesh nearer than `limit`.
 #[inline(never)]
 pub fn occluded<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
-    MeshTraversal::<true> { mesh }.run(ray, limit).t.lt(limit)
+    let hit = match mesh.thin {
+        true => MeshTraversal::<true, true> { mesh }.run(ray, limit),
+        false => MeshTraversal::<true, false> { mesh }.run(ray, limit),
+    };
+    hit.t.lt(limit)
 }
 
 /// Returns the result of [`closest`], for tests and benches. The rays traverse the BVH as a packet
@@ -283,7 +278,7 @@ pub fn closest_with<L: SimdFloat>(
     limit: L,
     all: bool,
 ) -> TriangleHit<L> {
-    let (packet, walk) = (slab_packet(ray, mesh), MeshTraversal::<false> { mesh });
+    let (packet, walk) = (slab_packet(ray, mesh), MeshTraversal::<false, false> { mesh });
     if all {
         walk.traverse_as_packet(ray, &packet, limit)
     } else {
