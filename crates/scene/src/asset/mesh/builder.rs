@@ -309,7 +309,7 @@ impl<'a> Builder<'a> {
         };
         let hash = |corners: &[[u32; 3]; 3]| {
             corners.as_flattened().iter().fold(0, |hash: u64, bits| {
-                (hash ^ u64::from(*bits)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
+                (hash.rotate_left(5) ^ u64::from(*bits)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
             })
         };
         // Most meshes have no equal triangles. Only those of hashes that occur twice are compared.
