@@ -70,3 +70,12 @@ fn banner_of_a_broken_file_goes_when_the_file_is_good_again() {
     desk.keys("`k`");
     assert!(desk.model.file.broken.is_none() && desk.model.is_unsaved());
 }
+
+#[test]
+fn form_of_a_mesh_begins_with_the_name_of_its_file() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("a `mesh` Enter `missing.obj` Enter");
+    assert!(desk.problem().is_some_and(|problem| problem.contains("no such file")));
+    desk.keys("Esc Esc");
+    assert_eq!(desk.text(), ROOM);
+}

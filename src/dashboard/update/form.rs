@@ -44,6 +44,10 @@ impl UpdateContext<'_> {
                     fields: FieldList::default(),
                 }));
                 self.show();
+                // A mesh begins with the name of its file.
+                if self.show_row(|line| line.property.key == "shape.mesh.file") {
+                    self.open_field();
+                }
             }
             Err(error) => self.refuse(&error.to_string()),
         }
