@@ -276,6 +276,9 @@ fn panel_stories() -> Vec<Story> {
         story("find a field or a part of the scene", "/ `gla` Enter", |_, d| {
             d.model.selection == GLASS
         }),
+        story("find a field or a part of the scene", "/ `rou` Enter Enter `.2` Enter", |_, d| {
+            mirror(d).roughness == 0.2
+        }),
         selected(
             "find a field or a part of the scene",
             GLASS,

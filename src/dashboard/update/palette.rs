@@ -93,15 +93,17 @@ impl UpdateContext<'_> {
         self.open_pick(title, entries, 0, |c, label| c.choose(label));
     }
 
-    /// Filters the properties in the inspector, or elsewhere lists the parts of the scene.
+    /// Filters the properties in the inspector, or elsewhere lists parts and fields of the scene.
     pub(super) fn find(&mut self) {
         if self.model.context() == KeyContext::Inspector {
             return self.open_filter("");
         }
-        let parts = self.palette().into_iter();
-        let parts = parts.filter(|(_, choice)| matches!(choice, Choice::Select(_)));
-        let parts: Vec<_> = parts.map(|(entry, _)| entry).collect();
-        self.open_pick("find a part of the scene", parts, 0, |c, name| c.choose(name));
+        let found = self.palette().into_iter();
+        let found = found.filter(|(_, choice)| !matches!(choice, Choice::Run(_)));
+        let (parts, fields): (Vec<_>, Vec<_>) =
+            found.partition(|(_, choice)| matches!(choice, Choice::Select(_)));
+        let entries: Vec<_> = parts.into_iter().chain(fields).map(|(entry, _)| entry).collect();
+        self.open_pick("find a part or a field", entries, 0, |c, name| c.choose(name));
     }
 
     fn palette(&self) -> Vec<(PickEntry, Choice)> {
