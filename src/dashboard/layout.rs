@@ -192,27 +192,30 @@ struct PictureCells {
 }
 
 impl PictureCells {
-    /// Adds the pixels of the picture, unless cells show each pixel of the film. A pixel of a film
-    /// that fits into `inside` is a square of whole pixels of the screen. The cells then show the
-    /// part of the film that covers them exactly.
+    /// Adds the pixels of the picture, unless cells show each pixel of the film. A film pixel is a
+    /// square, of whole pixels of the screen if the film fits into `inside`. The cells then show
+    /// the part of the film that covers them exactly.
     fn with_pixels(self, inside: Rect, is_whole: bool, cell: [usize; 2]) -> Self {
         let Self { image, raster, window, .. } = self;
         if raster[0] >= window.size[0] {
             return self;
         }
         let room = [usize::from(inside.width) * cell[0], usize::from(inside.height) * cell[1]];
-        let times = (room[0] / window.size[0]).min(room[1] / window.size[1]);
-        if !is_whole || times == 0 {
+        if !is_whole {
             let size = [usize::from(image.width) * cell[0], raster[1] * cell[1] / 2];
             let grid = PixelGrid { place: image, size, cell, window };
             return Self { pixels: Some(grid), ..self };
         }
-        let size = window.size.map(|n| n * times);
+        let [across, down] = [0, 1].map(|i| room[i] as f64 / window.size[i] as f64);
+        let scale = across.min(down);
+        let scale = if scale < 1.0 { scale } else { scale.floor() };
+        let size = window.size.map(|n| ((n as f64 * scale).round() as usize).max(1));
         let [width, height] = [0, 1].map(|i| size[i].div_ceil(cell[i]));
         let place = centred(inside, [width, 2 * height]);
         let cells = [0, 1].map(|i| (size[i] / cell[i]).max(1));
         let image = Rect { width: cells[0] as u16, height: cells[1] as u16, ..place };
-        let shown = [0, 1].map(|i| (cells[i] * cell[i] / times).clamp(1, window.size[i]));
+        let shown = [0, 1]
+            .map(|i| (((cells[i] * cell[i]) as f64 / scale) as usize).clamp(1, window.size[i]));
         Self {
             image,
             raster: [cells[0], 2 * cells[1]],

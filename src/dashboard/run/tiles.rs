@@ -279,7 +279,9 @@ fn tiles(protocol: Protocol, grid: PixelGrid) -> Vec<Tile> {
         // Placeholders show whole cells.
         let [width, height] = match protocol {
             Protocol::KittyThroughTmux => whole,
-            _ => [0, 1].map(|i| whole[i].min(size[i].saturating_sub(start[i]))),
+            Protocol::Kitty | Protocol::Sixel(_) | Protocol::Blocks => {
+                [0, 1].map(|i| whole[i].min(size[i].saturating_sub(start[i])))
+            }
         };
         let image = TileImage { protocol, index, second: false, place: cells };
         Tile {

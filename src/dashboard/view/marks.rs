@@ -20,7 +20,7 @@ pub fn is_selected(model: &Model, hit: &FirstHit) -> bool {
         Target::Material(name) => {
             model.scene().objects.get(index).is_some_and(|object| object.names_material(name))
         }
-        _ => false,
+        Target::Camera | Target::View(_) | Target::Light(_) | Target::Settings(_) => false,
     }
 }
 

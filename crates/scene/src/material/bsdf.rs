@@ -119,7 +119,7 @@ fn one_minus_cos_of_tan(r: f64) -> f64 {
 
 /// Returns the roughness with which the lobes `Cone` and `Square` of the roughness `r` are evaluated:
 /// larger by the rounding errors of sampled directions, which would otherwise have the density 0.
-/// Where the errors lose less than 1 in 10,000 samples, it is `r`.
+/// At larger roughness, where the errors lose less than 1 in 10,000 samples, it is `r` itself.
 fn evaluated_roughness<S: Float>(r: f64) -> f64 {
     if r < S::EPSILON * f64::from(1 << 14) { r + 8.0 * S::EPSILON } else { r }
 }
