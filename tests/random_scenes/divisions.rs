@@ -66,4 +66,4 @@ fn same_samples(scene: &Scene) -> Verdict {
     Verdict::Same
 }
 
-scene_tests!(divisions, 0..24, many_divisions, many(), same_samples);
+scene_tests!(divisions, 0..8, many_divisions, many(), same_samples);

@@ -180,7 +180,7 @@ fn same_with_gaps(scene: &Scene) -> Verdict {
 
 scene_tests!(
     gaps,
-    seeds_of(Layout::Contact, 0..24),
+    seeds_of(Layout::Contact, 0..12),
     many_gaps,
     seeds_of(Layout::Contact, many()),
     same_with_gaps

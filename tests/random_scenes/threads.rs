@@ -55,4 +55,4 @@ fn same_outcome(scene: &Scene) -> Verdict {
     Verdict::Same
 }
 
-scene_tests!(threads, 0..24, many_threads, many(), same_outcome);
+scene_tests!(threads, 0..16, many_threads, many(), same_outcome);
