@@ -6,10 +6,10 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use zerkalo_kernel::sampling::SamplerKind;
-use zerkalo_render::film::{Display, Tone};
+use zerkalo_render::film::Display;
 use zerkalo_render::image_file::Depth;
 use zerkalo_render::plan::MAX_SHARDS;
-use zerkalo_scene::{Acceleration, Scene};
+use zerkalo_scene::{Acceleration, Scene, Tone};
 use zerkalo_terminal::Environment;
 use zerkalo_terminal::image::GraphicsMode;
 use zerkalo_world::Precision;
@@ -91,8 +91,9 @@ pub struct PictureArgs {
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_negative_numbers = true)]
     exposure: f64,
     /// Tone curve for light brighter than white: clip it, or compress it and keep the hue
-    #[arg(long, value_parser = choice(Tone::NAMED.map(|(name, tone)| (name, None, tone))), default_value = "clip")]
-    tone: Tone,
+    /// [default: the scene's `film.tone`]
+    #[arg(long, value_parser = choice(Tone::ALL.map(|tone| (tone.name(), None, tone))))]
+    tone: Option<Tone>,
 }
 
 /// Subcommands of `zerkalo`.
@@ -371,8 +372,9 @@ impl ComputeArgs {
 }
 
 impl PictureArgs {
-    pub fn display(&self) -> Display {
-        Display { exposure_ev: self.exposure, tone: self.tone }
+    pub fn display(&self, scene: &Scene) -> Display {
+        let tone = self.tone.unwrap_or(scene.film.tone);
+        Display { exposure_ev: self.exposure, tone }
     }
 
     /// Sets the size of `scene` to `--size`.

@@ -17,7 +17,7 @@ use zerkalo_render::{Checkpoint, Options};
 use zerkalo_scene::asset::Assets;
 use zerkalo_scene::disk::open_regular;
 use zerkalo_scene::value::sanitized;
-use zerkalo_scene::{Recovery, SceneFile, state_folder};
+use zerkalo_scene::{Recovery, SceneFile, Tone, state_folder};
 use zerkalo_terminal::Environment;
 use zerkalo_world::Precision;
 
@@ -55,12 +55,14 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             (sampling, args.precision.precision)
         }
     };
+    let tone = file.as_ref().map_or_else(|_| Tone::default(), |file| file.scene().film.tone);
+    let display = Display { tone, ..Display::default() };
     let setup = Setup {
         file,
         checkpoint,
         state,
         threads: args.compute.threads(),
-        options: Options::new(precision, sampling, Display::default()),
+        options: Options::new(precision, sampling, display),
         terminal: args.terminal.setup(environment),
         trace: args.trace.clone(),
     };

@@ -62,7 +62,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     let sampling = SampleSettings { seed: args.compute.seed, kind: args.sampler };
-    let options = Options::new(args.precision.precision, sampling, args.picture.display());
+    let options = Options::new(args.precision.precision, sampling, args.picture.display(&scene));
     warn_of_precision(&scene, &options.world);
     let threads = args.compute.threads();
     let mut pilot = SyncRender::new(&scene, &options, settings(pilot_noise), threads)?;
@@ -75,7 +75,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         seed: args.compute.seed,
         sampler: args.sampler,
         precision: state.world.info().precision.to_string(),
-        display: args.picture.display(),
+        display: args.picture.display(&scene),
         rays_per_pixel: scene.film.rays_per_pixel,
         noise_levels: args.noise,
         shards: args.shards,

@@ -52,7 +52,8 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
     let signals = handle_signals()?;
     let sampling = SampleSettings { seed: args.compute.seed, kind: args.sampler };
-    let mut options = Options::new(args.precision.precision, sampling, args.picture.display());
+    let mut options =
+        Options::new(args.precision.precision, sampling, args.picture.display(&scene));
     let division = args.memory.map(|cap| Division::new(&scene, &options.world, args, cap));
     let division = division.transpose()?;
 

@@ -41,7 +41,7 @@ pub use object::Object;
 pub use recovery::{Orphan, Recovery, RecoveryFile, state_folder};
 pub use settings::{
     Acceleration, Ambient, Background, BelowHorizon, FilmSettings, Filter, IntegratorSettings,
-    RayTypes,
+    RayTypes, Tone,
 };
 pub use validate::Problem;
 

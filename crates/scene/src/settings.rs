@@ -11,6 +11,32 @@ description! {
         filter: Filter = "box";
         /// Largest number of samples of a pixel that shows glossy reflections; 0 is no cap.
         rays_per_pixel: u32 = 0, in closed(0.0, 1e9) "samples";
+        /// Display of light that is brighter than white; the samples stay the same.
+        tone: Tone = "clip";
+    }
+}
+
+choices! {
+    /// Tone curve from radiance to linear light of a display, as a fraction of its white.
+    pub enum Tone {
+        /// each colour channel is clipped at 1
+        Clip = "clip",
+        /// the Khronos PBR Neutral tone mapper (Khronos specification of 2024): it subtracts at most
+        /// 0.04 from all channels, then compresses the colours whose largest channel is still above
+        /// 0.76, and keeps their hues
+        Neutral = "neutral",
+    }
+}
+
+impl Tone {
+    /// Word in scene files, options and film files.
+    pub fn name(self) -> &'static str {
+        Self::CHOICES[self as usize].name
+    }
+
+    /// Inverse of [`Self::name`].
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|tone| tone.name() == name)
     }
 }
 

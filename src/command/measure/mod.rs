@@ -26,10 +26,10 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     let reference = args.reference.as_ref();
-    let display = args.picture.display();
+    let display = args.picture.display(&scene);
     let reference = reference.map(|path| given_reference(path, scene.film.size, &display));
     let reference = reference.transpose()?;
-    let plan = plan(args);
+    let plan = plan(args, display);
     let signals = handle_signals()?;
     let bar = ProgressBar::new(1).with_style(style("measuring {bar:30} {msg}"));
     let measurement =
@@ -61,7 +61,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     }
 }
 
-fn plan(args: &MeasureArgs) -> Plan {
+fn plan(args: &MeasureArgs, display: Display) -> Plan {
     let all = EXPERIMENTS.iter();
     let experiments = match &args.only[..] {
         [] => all.filter(|e| args.full || SHORT.contains(&e.name)).collect(),
@@ -77,7 +77,7 @@ fn plan(args: &MeasureArgs) -> Plan {
         seconds,
         threads: args.compute.threads(),
         seed: args.compute.seed,
-        display: args.picture.display(),
+        display,
     }
 }
 

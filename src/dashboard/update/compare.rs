@@ -1,9 +1,11 @@
 //! Commands on the display of the picture: exposure, tone curve, channel, pixel probe, comparison.
 
-use crate::dashboard::update::{Direction, cycled};
+use crate::dashboard::update::{Coalesce, Direction, cycled};
 use crate::dashboard::{DisplayChannel, Effect, Mode, UpdateContext};
 use std::sync::Arc;
-use zerkalo_render::film::{LinearImage, Tone};
+use zerkalo_render::film::LinearImage;
+use zerkalo_scene::Tone;
+use zerkalo_scene::edit::{self, SceneSettings, Target};
 use zerkalo_terminal::cells::linear;
 
 /// Change of the exposure per step, in stops.
@@ -49,11 +51,15 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn next_tone(&mut self) {
-        let current = |(_, tone): &(_, Tone)| *tone == self.model.display.tone;
-        let (name, tone) = *cycled(&Tone::NAMED, current, 1);
-        self.model.display.tone = tone;
-        self.set_display();
-        self.say(format!("tone curve: {name}"));
+        let tone = *cycled(&Tone::ALL, |tone| *tone == self.model.display.tone, 1);
+        if self.model.watch.is_some() {
+            self.model.display.tone = tone;
+            self.set_display();
+        } else {
+            let film = Target::Settings(SceneSettings::Film);
+            self.commit(edit::set(self.scene(), &film, "tone", tone.name()), Coalesce::Repeat);
+        }
+        self.say(format!("tone curve: {}", tone.name()));
     }
 
     fn set_display(&mut self) {

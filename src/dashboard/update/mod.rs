@@ -173,6 +173,10 @@ impl UpdateContext<'_> {
     fn show(&mut self) {
         self.model.follow_edits();
         let scene = Arc::clone(self.model.seen());
+        if self.model.display.tone != scene.film.tone {
+            self.model.display.tone = scene.film.tone;
+            self.emit(Effect::Display(self.model.display));
+        }
         self.emit(Effect::Show(scene));
         self.repaint();
     }

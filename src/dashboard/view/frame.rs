@@ -6,7 +6,7 @@ use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::{DisplayChannel, Focus, Layout, Mode, Model};
 use ratatui::style::Modifier;
-use zerkalo_render::film::Tone;
+use zerkalo_scene::Tone;
 
 pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &mut Painter) {
     let theme = painter.theme;

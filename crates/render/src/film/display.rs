@@ -1,32 +1,8 @@
 //! Display transform of radiance to pixel values: exposure, tone curve, sRGB encoding.
 
 use crate::film::srgb_table::SRGB_TABLE;
+use zerkalo_scene::Tone;
 use zerkalo_scene::value::srgb_from_linear;
-
-/// Tone curve from radiance to linear light of a display, as a fraction of its white.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Tone {
-    /// Each colour channel is clipped at 1.
-    #[default]
-    Clip,
-    /// The Khronos PBR Neutral tone mapper (Khronos specification of 2024). It subtracts at most
-    /// 0.04 from all channels. It then compresses the colours whose largest channel is still above
-    /// 0.76, and keeps their hues.
-    Neutral,
-}
-
-impl Tone {
-    /// All tone curves, each with the name that options and scenes use.
-    pub const NAMED: [(&'static str, Self); 2] = [("clip", Self::Clip), ("neutral", Self::Neutral)];
-
-    pub fn name(self) -> &'static str {
-        Self::NAMED[self as usize].0
-    }
-
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::NAMED.into_iter().find(|(known, _)| *known == name).map(|(_, tone)| tone)
-    }
-}
 
 /// Display transform: exposure, then tone curve, then sRGB encoding.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -158,8 +134,9 @@ mod tests {
 
     #[test]
     fn tone_curves_rise_and_stay_in_range() {
-        for (name, tone) in Tone::NAMED {
-            assert_eq!((Tone::from_name(name), tone.name()), (Some(tone), name));
+        for tone in Tone::ALL {
+            let name = tone.name();
+            assert_eq!(Tone::from_name(name), Some(tone));
             let display = Display { exposure_ev: 0.0, tone };
             let mut last = 0.0;
             for i in 0..20_000 {

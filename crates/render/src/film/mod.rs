@@ -25,7 +25,7 @@ mod tile;
 
 pub use box_filter::box_means;
 pub use detail::{Detail, Window};
-pub use display::{Display, Tone, quantised_16};
+pub use display::{Display, quantised_16};
 pub use downsample::{IncrementalDownsample, Thumbnail};
 pub use light_weights::{LightWeights, Replicates, Sums};
 pub use linear_image::LinearImage;

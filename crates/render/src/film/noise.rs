@@ -36,10 +36,11 @@
 //! sqrt(2 k). The true error of the picture varies by the same ratio between random seeds.
 
 use crate::film::TILE;
-use crate::film::display::{Display, Tone, toned};
+use crate::film::display::{Display, toned};
 use crate::film::light_weights::LightWeights;
 use crate::film::srgb_table::{SRGB_TABLE, SrgbTable};
 use crate::film::tile::Tile;
+use zerkalo_scene::Tone;
 
 /// Pair of numbers, one for each of the two measures of error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

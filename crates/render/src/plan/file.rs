@@ -5,7 +5,7 @@
 //! glossy tile, otherwise `-`.
 
 use crate::file_error::{self, FileError, begins_with};
-use crate::film::{Display, Tone};
+use crate::film::Display;
 use crate::plan::{MAX_SHARDS, Plan, PlanSettings, PlannedTile, tiles_of};
 use crate::schedule::MAX_SAMPLES;
 use std::fmt::Write as _;
@@ -13,6 +13,7 @@ use std::io::Read;
 use std::path::Path;
 use std::str::FromStr;
 use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_scene::Tone;
 use zerkalo_scene::value::{fnv1a64, sanitized, truncated};
 use zerkalo_world::Precision;
 

@@ -70,7 +70,7 @@ fn material_names(scene: &Scene) -> impl Iterator<Item = &str> {
 fn fixed_parts(scene: &Scene) -> Scene {
     let Scene { film, trace, camera, background, ambient, objects, .. } = scene.clone();
     let mut fixed = Scene { film, trace, camera, background, ambient, objects, ..Scene::default() };
-    fixed.film.rays_per_pixel = 0;
+    (fixed.film.rays_per_pixel, fixed.film.tone) = (0, zerkalo_scene::Tone::Clip);
     (fixed.background.color, fixed.ambient.color) = (Color::BLACK, Color::BLACK);
     for object in &mut fixed.objects {
         let names = [&mut object.name, &mut object.material];

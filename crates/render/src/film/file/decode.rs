@@ -2,7 +2,7 @@
 //! memory.
 
 use crate::file_error::{self, FileError, begins_with};
-use crate::film::display::{Display, Tone};
+use crate::film::display::Display;
 use crate::film::file::encode::CHECKSUM_BYTES;
 use crate::film::file::{
     DONE, FilmFileHeader, HEAD, MAGIC, MAX_SIDE, META, SavedFilm, TILES, TILES_PER_CHUNK, Tag,
@@ -16,6 +16,7 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use zerkalo_scene::Tone;
 use zerkalo_scene::value::truncated;
 use zerkalo_world::Precision;
 

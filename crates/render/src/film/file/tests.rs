@@ -4,9 +4,10 @@ use super::*;
 use crate::FileError;
 use crate::film::testing::TestFilm;
 use crate::film::testing::{Rng, each_tile, film, white};
-use crate::film::{Film, TILE, Tone};
+use crate::film::{Film, TILE};
 use std::io::Cursor;
 use std::path::Path;
+use zerkalo_scene::Tone;
 
 /// Returns a film whose integer sums need 0 to 8 bytes. Some of its tiles have no samples, some are
 /// cut by the edge of the picture, and their sample counts differ.
