@@ -4,11 +4,12 @@ use crate::dashboard::run::{Colors, TerminalSetup};
 use crate::measure::{EXPERIMENTS, Experiment};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::film::Display;
 use zerkalo_render::image_file::Depth;
 use zerkalo_render::plan::MAX_SHARDS;
+use zerkalo_scene::disk::{Existing, Replacement, WriteError, check_writable};
 use zerkalo_scene::{Acceleration, Scene, Tone};
 use zerkalo_terminal::Environment;
 use zerkalo_terminal::image::GraphicsMode;
@@ -25,6 +26,9 @@ use zerkalo_world::Precision;
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
+    /// Print errors only
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
     #[command(flatten)]
     pub edit: EditArgs,
 }
@@ -32,7 +36,8 @@ pub struct Cli {
 /// Arguments of `zerkalo` without a subcommand.
 #[derive(Clone, Debug, Args)]
 pub struct EditArgs {
-    /// A scene file [default: a built-in scene], or a checkpoint to continue
+    /// A scene file [default: a built-in scene], :NAME for a built-in scene, or a checkpoint to
+    /// continue
     pub scene: Option<PathBuf>,
     #[command(flatten)]
     pub compute: ComputeArgs,
@@ -73,6 +78,22 @@ pub struct ComputeArgs {
     pub seed: u64,
 }
 
+/// Option of every command that reports results.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct JsonArgs {
+    /// Print the results as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Option of every command that writes files.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct ClobberArgs {
+    /// Refuse to replace files that exist
+    #[arg(short, long)]
+    no_clobber: bool,
+}
+
 /// Arguments of every command that compiles a scene: the option `--precision`.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PrecisionArgs {
@@ -110,19 +131,20 @@ pub enum Command {
     /// Measure the cost of accuracy on a scene: seconds to a given noise, gain and cost of settings
     Measure(Box<MeasureArgs>),
     /// Validate a scene and print its contents
-    Check {
-        /// The scene file
-        scene: PathBuf,
-    },
+    Check(CheckArgs),
     /// Print the origin of a picture, checkpoint or plan: scene, samples, noise, seed, shards
     Info(InfoArgs),
+    /// Compare two pictures: RMSE, largest difference, and what the noise of both explains
+    Compare(CompareArgs),
+    /// List the built-in scenes, print one or copy it to a file
+    Scenes(ScenesArgs),
     /// Write a commented starter scene
     New {
         /// The scene file to write; must not exist
         file: PathBuf,
     },
     /// Report the capabilities of the terminal and of the connection, and how to improve them
-    Doctor,
+    Doctor(JsonArgs),
 }
 
 /// Arguments of `zerkalo render`.
@@ -132,11 +154,20 @@ pub enum Command {
                         first; with none of them, at --noise 0.5."
 )]
 pub struct RenderArgs {
-    /// The scene file
+    /// The scene file; - for stdin, :NAME for a built-in scene (`zerkalo scenes` lists them)
     pub scene: PathBuf,
-    /// The picture file; its extension chooses the format: .png or .exr
+    /// Further scenes, rendered one after another; %d in the names of files is then the number of
+    /// the scene, from 1, and %04d has leading zeros
+    #[arg(value_name = "SCENE", conflicts_with = "plan")]
+    pub more: Vec<PathBuf>,
+    /// The picture file; its extension chooses the format: .png or .exr; - for stdout
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Format of the picture, instead of that of the extension [default for stdout: png]
+    #[arg(long, value_parser = ["png", "exr"], conflicts_with = "plan")]
+    pub format: Option<String>,
+    #[command(flatten)]
+    pub clobber: ClobberArgs,
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Stop at this many samples per pixel (the mean, if adaptive; rounds up to even)
@@ -168,7 +199,13 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "exposure", "tone", "spp", "noise", "rmse", "time", "seed", "precision", "sampler", "uniform", "stats"])]
     pub plan: Option<PathBuf>,
     /// Trace only this shard of the plan, into a .zk file; 0 is the base, the pilot's samples
-    #[arg(long, value_name = "K", requires = "plan", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "K",
+        requires = "plan",
+        conflicts_with = "no_clobber",
+        allow_negative_numbers = true
+    )]
     pub shard: Option<u32>,
     /// Stay below this much memory, such as 4GB: if needed, lights share a light group; if that is
     /// not enough, the picture is rendered in regions and written row by row
@@ -207,6 +244,10 @@ pub struct PlanArgs {
     /// The plan file to write
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub clobber: ClobberArgs,
+    #[command(flatten)]
+    pub json: JsonArgs,
     /// Target: estimated RMSE of the displayed picture, in 8-bit levels
     #[arg(long, value_name = "LEVELS", value_parser = positive, default_value_t = 0.5, allow_negative_numbers = true)]
     pub noise: f64,
@@ -243,6 +284,10 @@ pub struct MergeArgs {
     /// The file to write: a picture (.png, .exr) or a film (.zk)
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub clobber: ClobberArgs,
+    #[command(flatten)]
+    pub json: JsonArgs,
     /// Accept missing and unfinished shards, and report what they cost in noise
     #[arg(long)]
     pub partial: bool,
@@ -305,6 +350,42 @@ pub struct WatchArgs {
     pub terminal: TerminalArgs,
 }
 
+/// Arguments of `zerkalo check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// The scene file; - for stdin
+    pub scene: PathBuf,
+    #[command(flatten)]
+    pub json: JsonArgs,
+}
+
+/// Arguments of `zerkalo compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// A PNG or OpenEXR picture
+    pub a: PathBuf,
+    /// The picture to compare it with
+    pub b: PathBuf,
+    /// Write a picture of the difference: orange where B is brighter, blue where it is darker
+    #[arg(short, long, value_name = "FILE.png", value_parser = png_file)]
+    pub output: Option<PathBuf>,
+    /// Exit with status 1 if the RMSE exceeds this number of 8-bit levels
+    #[arg(long, value_name = "LEVELS", value_parser = not_negative, allow_negative_numbers = true)]
+    pub threshold: Option<f64>,
+    #[command(flatten)]
+    pub json: JsonArgs,
+}
+
+/// Arguments of `zerkalo scenes`.
+#[derive(Debug, Args)]
+pub struct ScenesArgs {
+    /// The scene to print
+    pub name: Option<String>,
+    /// The file to copy it to; must not exist
+    #[arg(requires = "name")]
+    pub file: Option<PathBuf>,
+}
+
 /// Arguments of `zerkalo info`.
 #[derive(Debug, Args)]
 pub struct InfoArgs {
@@ -313,6 +394,8 @@ pub struct InfoArgs {
     /// Compare the file with this scene; exit status 1 if it shows another one
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub json: JsonArgs,
 }
 
 const PRECISIONS: [Choice<Precision>; 3] = [
@@ -371,6 +454,20 @@ impl ComputeArgs {
     }
 }
 
+impl ClobberArgs {
+    pub fn existing(&self) -> Existing {
+        if self.no_clobber { Existing::Refuse } else { Existing::Replace }
+    }
+
+    /// Checks that the file at `path` can be written.
+    pub fn check_writable(&self, path: &Path) -> Result<(), WriteError> {
+        match self.existing() {
+            Existing::Replace => check_writable(path),
+            Existing::Refuse => Replacement::begin(path, Existing::Refuse).map(drop),
+        }
+    }
+}
+
 impl PictureArgs {
     pub fn display(&self, scene: &Scene) -> Display {
         let tone = self.tone.unwrap_or(scene.film.tone);
@@ -420,6 +517,10 @@ fn positive(text: &str) -> Result<f64, String> {
     number(text, |x| x.is_finite() && x > 0.0, "a number greater than 0")
 }
 
+fn not_negative(text: &str) -> Result<f64, String> {
+    number(text, |x| x.is_finite() && x >= 0.0, "a number of at least 0")
+}
+
 fn bandwidth(text: &str) -> Result<f64, String> {
     number(text, |x| (1.0..=1e6).contains(&x), "a number from 1 to 1000000")
 }
@@ -452,9 +553,17 @@ fn memory(text: &str) -> Result<u64, String> {
 }
 
 fn svg_file(name: &str) -> Result<PathBuf, String> {
+    file_of(name, "svg")
+}
+
+fn png_file(name: &str) -> Result<PathBuf, String> {
+    file_of(name, "png")
+}
+
+fn file_of(name: &str, format: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(name);
-    let is_svg = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
-    if is_svg { Ok(path) } else { Err("expected a name that ends in .svg".to_string()) }
+    let fits = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(format));
+    if fits { Ok(path) } else { Err(format!("expected a name that ends in .{format}")) }
 }
 
 #[cfg(test)]

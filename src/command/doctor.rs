@@ -1,11 +1,13 @@
 //! `zerkalo doctor`: reports the capabilities of the terminal and of the connection, and how to
 //! improve them.
 
+use crate::command::args::JsonArgs;
 use crate::command::edit::obstacle;
-use crate::command::{Failure, print_line};
+use crate::command::{Failure, print_json, print_line};
 use crate::dashboard::graphics::Graphics;
 use crate::dashboard::run::{Colors, TerminalReport, diagnose};
 use crate::dashboard::text::wrapped;
+use serde_json::{Map, Value};
 use std::env;
 use std::time::Duration;
 use zerkalo_scene::value::sanitized;
@@ -18,7 +20,7 @@ const COLUMNS: usize = 80;
 /// Width of the names at the start of lines, in columns.
 const NAME: usize = 17;
 
-pub fn run() -> Result<(), Failure> {
+pub fn run(args: JsonArgs) -> Result<(), Failure> {
     let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
     let environment = Environment::of(variable);
     let diagnosis = match obstacle(&environment) {
@@ -33,7 +35,10 @@ pub fn run() -> Result<(), Failure> {
             .into_iter()
             .find_map(|name| variable(name).map(|value| (name, value))),
     };
-    print_line(&report.report())
+    match args.json {
+        true => print_json(&report.results()),
+        false => print_line(&report.report()),
+    }
 }
 
 /// Results of all tests, from which the report is formatted.
@@ -48,28 +53,49 @@ struct DoctorReport {
 impl DoctorReport {
     fn report(&self) -> String {
         let mut lines = vec![format!("zerkalo {}", env!("CARGO_PKG_VERSION")), String::new()];
-        let row = |name: &str, value: &str| indented(&format!("{name:<NAME$}"), value);
-        lines.push(row("terminal", &self.terminal()));
-        lines.push(row("multiplexer", &self.multiplexer()));
-        lines.push(row("colours", &self.colors()));
-        if let Ok(TerminalReport { terminal, mode, cells }) = &self.diagnosis {
-            lines.push(row("background", &background(terminal)));
-            lines.push(row("size", &size(*cells, terminal.cell_px)));
-            lines.push(row("whole frames", whole_frames(terminal)));
-            lines.push(row("still pictures", &stills(terminal)));
-            let live = Graphics::new(terminal.clone(), GraphicsMode::Automatic);
-            lines.push(row("live picture", &live.description()));
-            lines.push(row("acknowledgement", acknowledgement(*mode)));
-            lines.push(row("round trip", &round_trip(terminal)));
-        }
-        lines.push(row("connection", &self.connection()));
-        lines.push(row("text", &self.text()));
+        let row = |(name, value): (&str, String)| indented(&format!("{name:<NAME$}"), &value);
+        lines.extend(self.rows().into_iter().map(row));
         let hints = self.hints();
         if !hints.is_empty() {
             lines.extend([String::new(), "hints".to_string()]);
             lines.extend(hints.iter().map(|hint| indented("- ", hint)));
         }
         lines.join("\n")
+    }
+
+    /// Returns the results of `--json`: the rows of the report by their names, and the hints.
+    fn results(&self) -> Value {
+        let mut results: Map<_, _> = self
+            .rows()
+            .into_iter()
+            .map(|(name, value)| (name.replace(' ', "_"), value.into()))
+            .collect();
+        results.insert("version".to_string(), env!("CARGO_PKG_VERSION").into());
+        results.insert("hints".to_string(), self.hints().into());
+        results.into()
+    }
+
+    /// Returns names and values of the rows of the report.
+    fn rows(&self) -> Vec<(&'static str, String)> {
+        let mut rows = vec![
+            ("terminal", self.terminal()),
+            ("multiplexer", self.multiplexer()),
+            ("colours", self.colors()),
+        ];
+        if let Ok(TerminalReport { terminal, mode, cells }) = &self.diagnosis {
+            let live = Graphics::new(terminal.clone(), GraphicsMode::Automatic);
+            rows.extend([
+                ("background", background(terminal)),
+                ("size", size(*cells, terminal.cell_px)),
+                ("whole frames", whole_frames(terminal).to_string()),
+                ("still pictures", stills(terminal)),
+                ("live picture", live.description()),
+                ("acknowledgement", acknowledgement(*mode).to_string()),
+                ("round trip", round_trip(terminal)),
+            ]);
+        }
+        rows.extend([("connection", self.connection()), ("text", self.text())]);
+        rows
     }
 
     fn capabilities(&self) -> Option<&Capabilities> {

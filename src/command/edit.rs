@@ -2,7 +2,7 @@
 
 use crate::command::args::EditArgs;
 use crate::command::load_progress::LoadReporter;
-use crate::command::{Failure, warn, write_line};
+use crate::command::{Failure, is_quiet, print_error, scenes, warn, write_line};
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{Ended, FaultyFile, Setup, run as run_dashboard};
 use crate::dashboard::scene_source::SceneSource;
@@ -33,7 +33,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let assets = reporter.assets.clone();
     let file = match (&checkpoint, &args.scene) {
         (Some(checkpoint), _) => Ok(scene_of(checkpoint, assets)?),
-        (None, Some(path)) => SceneSource::File(path.clone())
+        (None, Some(path)) => scenes::source(path)?
             .open(assets)
             .map_err(|errors| FaultyFile { path: path.clone(), errors }),
         (None, None) => Ok(SceneSource::BuiltIn(0).open(assets)?),
@@ -78,9 +78,10 @@ pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
             Ok(Exported { path, description, .. }) => {
                 lines.push(format!("{}  {description}", path.display()));
             }
-            Err(reason) => warn(reason),
+            Err(reason) => print_error(reason),
         }
     }
+    lines.retain(|_| !is_quiet());
     let printed = lines.iter().try_for_each(|line| write_line(&mut out, line));
     match &ended.kept {
         Ok(Some(path)) => {
@@ -88,7 +89,7 @@ pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
             warn(&format!("unsaved edits are kept in {path}; the next start offers them"));
         }
         Ok(None) => {}
-        Err(reason) => warn(reason),
+        Err(reason) => print_error(reason),
     }
     match ended.signalled {
         Some(status) => Err(Failure::Signalled(status)),

@@ -1,10 +1,12 @@
 //! `zerkalo info`: prints the origin of a picture, film or plan file, and compares it with a scene.
 
 use crate::command::args::InfoArgs;
-use crate::command::{Failure, print_line, read_scene};
+use crate::command::{Failure, print_json, print_line, read_scene};
+use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::Path;
 use zerkalo_render::SampleInputs;
-use zerkalo_render::export::{scene_hash, settings_text};
+use zerkalo_render::export::{noise_of_text, scene_hash, settings_text};
 use zerkalo_render::image_file::FileMetadata;
 use zerkalo_render::plan::{BASE, Part, Plan, is_plan_file};
 use zerkalo_scene::value::sanitized;
@@ -21,6 +23,12 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
             origin.entries.push(("Plan".to_string(), target(&part.plan)));
         }
     }
+    if args.json.json {
+        return print_json(&Origin::of(&origin, &args.file)).and_then(|()| match &args.scene {
+            Some(path) => compare(&origin, path, args).map(drop),
+            None => Ok(()),
+        });
+    }
     let [width, height] = origin.size;
     let (path, format) = (args.file.display(), origin.format);
     print_line(&format!("{path}: {format}, {width} x {height} pixels"))?;
@@ -32,8 +40,34 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         print_line(&format!("  {key:widest$}  {value}"))?;
     }
     match &args.scene {
-        Some(path) => compare(&origin, path, args),
+        Some(path) => print_line(&compare(&origin, path, args)?),
         None => Ok(()),
+    }
+}
+
+/// Results of `--json`. docs/command-line.md describes the keys.
+#[derive(Serialize)]
+struct Origin<'a> {
+    file: String,
+    format: &'a str,
+    size: [usize; 2],
+    noise_levels: Option<f64>,
+    rmse_linear: Option<f64>,
+    metadata: BTreeMap<&'a str, &'a str>,
+}
+
+impl<'a> Origin<'a> {
+    fn of(metadata: &'a FileMetadata, file: &Path) -> Self {
+        let noise = metadata.get("Noise").and_then(noise_of_text);
+        let entries = metadata.entries.iter();
+        Self {
+            file: file.display().to_string(),
+            format: metadata.format,
+            size: metadata.size,
+            noise_levels: noise.map(|noise| noise.levels),
+            rmse_linear: noise.map(|noise| noise.linear),
+            metadata: entries.map(|(key, value)| (key.as_str(), value.as_str())).collect(),
+        }
     }
 }
 
@@ -75,11 +109,11 @@ fn target(plan: &Plan) -> String {
     )
 }
 
-/// Compares `origin` with the scene file at `path`, and prints the result if they agree.
+/// Compares `origin` with the scene file at `path`. Returns the result if they agree.
 ///
 /// # Errors
 /// Fails if the file of `origin` shows another scene, or has no scene hash.
-fn compare(origin: &FileMetadata, path: &Path, args: &InfoArgs) -> Result<(), Failure> {
+fn compare(origin: &FileMetadata, path: &Path, args: &InfoArgs) -> Result<String, Failure> {
     let document = read_scene(path)?;
     let scene = document.scene();
     let [file, shown] = [&args.file, path].map(|path| path.display());
@@ -88,15 +122,13 @@ fn compare(origin: &FileMetadata, path: &Path, args: &InfoArgs) -> Result<(), Fa
         return Err(Failure::Failed(what));
     };
     if hash == scene_hash(document.text(), scene) {
-        return print_line(&format!(
-            "scene: {shown} and the files that it names are those of {file}"
-        ));
+        return Ok(format!("scene: {shown} and the files that it names are those of {file}"));
     }
     // `render --size` overrides the size in the scene file.
     let mut sized = scene.clone();
     sized.film.size = origin.size.map(|n| n as u32);
     match origin.film.as_ref().and_then(SampleInputs::of).map(|inputs| inputs.fit(&sized)) {
-        Some(true) => print_line(&format!(
+        Some(true) => Ok(format!(
             "scene: the pictures of {shown} and {file} differ in light weights, names or layout of \
              the text only; --resume keeps the samples"
         )),

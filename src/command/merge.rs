@@ -2,7 +2,8 @@
 
 use crate::command::args::MergeArgs;
 use crate::command::part_file::{self, FilmOutput};
-use crate::command::{Failure, on_signal, print_line, save};
+use crate::command::{Failure, on_signal, print_json, print_line, save};
+use serde::Serialize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use zerkalo_render::export::update_metadata;
@@ -10,7 +11,7 @@ use zerkalo_render::plan::Merged;
 use zerkalo_render::session::Report;
 
 pub fn run(args: &MergeArgs) -> Result<(), Failure> {
-    let output = FilmOutput::new(&args.output, args.bits)?;
+    let output = FilmOutput::new(&args.output, args.bits, args.clobber.existing())?;
     // A signal ends the command at once, but a write that has begun is finished.
     let is_writing = Arc::new(AtomicBool::new(false));
     let writes = Arc::clone(&is_writing);
@@ -26,6 +27,18 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     save::persist(|| output.write(&merged.film, &merged.header))?;
     let plan = &merged.part.plan;
     let path = args.output.display();
+    if args.json.json {
+        return print_json(&MergeResults {
+            output: path.to_string(),
+            spp_min: report.spp.min,
+            spp_mean: report.spp.mean,
+            spp_max: report.spp.max,
+            noise_levels: report.noise.map(|noise| noise.rmse.levels),
+            rmse_linear: report.noise.map(|noise| noise.rmse.linear),
+            rays: merged.part.rays,
+            missing: merged.part.missing(),
+        });
+    }
     print_line(&format!("{path}  {}  {} rays", part_file::summary(&report), merged.part.rays))?;
     if let Some(missing) = merged.part.missing() {
         print_line(&format!(
@@ -44,6 +57,19 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         ))?;
     }
     Ok(())
+}
+
+/// Results of `--json`. docs/command-line.md describes the keys.
+#[derive(Serialize)]
+struct MergeResults {
+    output: String,
+    spp_min: u32,
+    spp_mean: f64,
+    spp_max: u32,
+    noise_levels: Option<f64>,
+    rmse_linear: Option<f64>,
+    rays: u64,
+    missing: Option<String>,
 }
 
 /// Formats the noise of the merged picture, which lacks shards, and the noise predicted for all

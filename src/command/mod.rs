@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod checkpoints;
+mod compare;
 mod cpu;
 mod doctor;
 mod edit;
@@ -17,6 +18,7 @@ mod progress;
 mod regions;
 mod render;
 mod save;
+mod scenes;
 mod shard;
 mod stats;
 mod watch;
@@ -28,14 +30,18 @@ use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use load_progress::LoadReporter;
+use serde::Serialize;
 use std::ffi::OsString;
 use std::fmt::Display;
-use std::io::Write;
+use std::fs::File;
+use std::io::{self, IsTerminal, Write};
+use std::os::fd::AsFd;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use zerkalo_scene::value::sanitized;
-use zerkalo_scene::{Document, Scene};
+use zerkalo_scene::value::{nearest, sanitized};
+use zerkalo_scene::{Document, Scene, SceneErrors};
 use zerkalo_terminal::{INTERRUPTED, SignalQueue, Signals, is_in_foreground};
 use zerkalo_world::{self as world, Precision, requires_double};
 
@@ -68,16 +74,19 @@ impl<E: Display> From<E> for Failure {
 pub fn main() -> ExitCode {
     let started = Instant::now();
     let cli = parse_command_line();
+    QUIET.store(cli.quiet, Ordering::Relaxed);
     let result = match &cli.command {
         Some(Command::Render(args)) => render::run(args, started),
         Some(Command::Plan(args)) => plan::run(args),
         Some(Command::Merge(args)) => merge::run(args),
         Some(Command::Watch(args)) => watch::run(args),
         Some(Command::Measure(args)) => measure::run(args),
-        Some(Command::Check { scene }) => check::run(scene),
+        Some(Command::Check(args)) => check::run(args),
         Some(Command::Info(args)) => info::run(args),
+        Some(Command::Compare(args)) => compare::run(args),
+        Some(Command::Scenes(args)) => scenes::run(args),
         Some(Command::New { file }) => new::run(file),
-        Some(Command::Doctor) => doctor::run(),
+        Some(Command::Doctor(args)) => doctor::run(*args),
         None => edit::run(&cli.edit),
     };
     let (status, message) = match result {
@@ -86,7 +95,7 @@ pub fn main() -> ExitCode {
         Err(Failure::Usage(message)) => (WRONG_USAGE, message),
         Err(Failure::Signalled(status)) => return ExitCode::from(status),
     };
-    warn(&message);
+    print_error(&message);
     ExitCode::from(status)
 }
 
@@ -98,10 +107,13 @@ fn parse_command_line() -> Cli {
         let first = std::env::args_os().nth(1).unwrap_or_default();
         let first = first.to_string_lossy();
         let unknown = !first.starts_with('-') && Cli::command().find_subcommand(&*first).is_none();
-        if error.kind() == ErrorKind::ArgumentConflict && unknown {
-            let names: Vec<_> =
-                Cli::command().get_subcommands().map(|c| c.get_name().to_string()).collect();
-            let message = format!("`{first}` is no command; commands: {}", names.join(", "));
+        let kinds = [ErrorKind::ArgumentConflict, ErrorKind::UnknownArgument];
+        if kinds.contains(&error.kind()) && unknown && !Path::new(&*first).exists() {
+            let command = Cli::command();
+            let names: Vec<_> = command.get_subcommands().map(clap::Command::get_name).collect();
+            let near = nearest(&first, names.iter().copied());
+            let near = near.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
+            let message = format!("`{first}` is no command{near}; commands: {}", names.join(", "));
             end(&Cli::command().error(ErrorKind::InvalidSubcommand, message))
         }
         end(&error)
@@ -116,11 +128,11 @@ fn end(error: &clap::Error) -> ! {
         sanitized(&argument) != argument
     };
     if std::env::args_os().any(has_control_characters) {
-        warn(error.render().to_string().trim_end());
+        print_error(error.render().to_string().trim_end());
         std::process::exit(error.exit_code());
     }
     let printed = error.print();
-    let failed = printed.is_err_and(|error| error.kind() != std::io::ErrorKind::BrokenPipe);
+    let failed = printed.is_err_and(|error| error.kind() != io::ErrorKind::BrokenPipe);
     std::process::exit(if failed { 1 } else { error.exit_code() })
 }
 
@@ -133,7 +145,7 @@ fn handle_signals() -> Result<Signals, Failure> {
         let is_key = status == INTERRUPTED && is_in_foreground();
         let first = first.get_or_insert_with(Instant::now);
         if is_key && first.elapsed() >= SECOND_KEY {
-            warn("ended at once; what was not written is lost");
+            print_error("ended at once; what was not written is lost");
             std::process::exit(status.into());
         } else if is_key {
             warn("saving the results; Ctrl-C again ends at once");
@@ -147,45 +159,89 @@ fn on_signal(on_end: impl FnMut(u8) + Send + 'static) -> Result<Signals, Failure
     signals.map_err(|error| Failure::Failed(format!("no signals: {error}")))
 }
 
-/// Prints a line on stderr. Errors of writing are ignored.
-fn warn(message: &str) {
-    let _ = writeln!(std::io::stderr(), "{}", sanitized_lines(message));
+/// `true` with `--quiet`.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
 }
 
+/// Prints a warning or note on stderr, unless `--quiet` is given. Errors of writing are ignored.
+fn warn(message: &str) {
+    if !is_quiet() {
+        print_error(message);
+    }
+}
+
+/// Prints a line on stderr. Errors of writing are ignored.
+fn print_error(message: &str) {
+    let _ = writeln!(io::stderr(), "{}", sanitized_lines(message));
+}
+
+/// Prints a line of results on stdout, unless `--quiet` is given.
 fn print_line(message: &str) -> Result<(), Failure> {
-    write_line(std::io::stdout().lock(), message)
+    if is_quiet() { Ok(()) } else { write_line(io::stdout().lock(), message) }
+}
+
+/// Prints `results` as JSON. Characters that control a terminal are escaped.
+fn print_json(results: &impl Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(results)?;
+    let escaped = |c: char| match c {
+        '\n' => c.to_string(),
+        c if sanitized(c.encode_utf8(&mut [0; 4])).starts_with(c) => c.to_string(),
+        c => c.encode_utf16(&mut [0; 2]).iter().map(|unit| format!("\\u{unit:04x}")).collect(),
+    };
+    write_line(io::stdout().lock(), &text.chars().map(escaped).collect::<String>())
 }
 
 /// Writes a line to `out`. A closed pipe, as after `| head`, is not an error.
 fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
     let printed = writeln!(out, "{}", sanitized_lines(message)).and_then(|()| out.flush());
     match printed {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Failure::Failed(format!("cannot write to stdout: {error}")))
         }
         _ => Ok(()),
     }
 }
 
-/// Reads a scene file, or a built-in scene if `path` is its name. Messages on stderr report the loading of large files.
+/// Path that stands for stdin or stdout.
+const STREAM: &str = "-";
+
+/// Reads a scene like [`scene_or_errors`].
 fn read_scene(path: &Path) -> Result<Document, Failure> {
-    let name = path.to_string_lossy();
-    if let SceneSource::BuiltIn(index) = SceneSource::of(name.trim_end_matches(".toml"))
-        && !path.exists()
-    {
+    scene_or_errors(path)?.map_err(|errors| Failure::Failed(errors.with_excerpts()))
+}
+
+/// Reads a scene from a file, from stdin or from the built-in scenes. Messages on stderr report the
+/// loading of large files.
+fn scene_or_errors(path: &Path) -> Result<Result<Document, SceneErrors>, Failure> {
+    if let SceneSource::BuiltIn(index) = scenes::source(path)? {
         let (name, text) = BUILT_IN[index];
-        return Ok(Document::parse(text.to_string(), &format!("{name}.toml"))?);
+        return Ok(Document::parse(text.to_string(), &format!("{name}.toml")));
     }
-    Ok(Document::read(path, LoadReporter::new().assets)?)
+    let assets = LoadReporter::new().assets;
+    if path != Path::new(STREAM) {
+        return Ok(Document::read(path, assets));
+    }
+    if io::stdin().is_terminal() {
+        let message = "the scene - comes from a pipe or a file, and stdin is a terminal";
+        return Err(Failure::Usage(message.to_string()));
+    }
+    let stdin = io::stdin().as_fd().try_clone_to_owned().map(File::from);
+    Ok(Document::read_opened(Path::new("stdin"), stdin, assets))
 }
 
 /// Reads a scene file and prints its warnings.
 fn read_scene_and_warn(path: &Path) -> Result<Document, Failure> {
     let document = read_scene(path)?;
-    for warning in &document.warnings {
-        warn(&format!("warning: {warning}"));
-    }
+    warn_of_doubts(&document);
     Ok(document)
+}
+
+/// Prints the warnings about a scene file.
+fn warn_of_doubts(document: &Document) {
+    document.warnings.iter().for_each(|warning| warn(&format!("warning: {warning}")));
 }
 
 /// Warns if `options` demand single precision and `scene` requires double.

@@ -11,24 +11,25 @@ use zerkalo_render::film::file::{EncodedFilm, FilmFileHeader};
 use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::plan::Part;
 use zerkalo_render::session::Report;
-use zerkalo_scene::disk::{Existing, WriteError, check_writable};
+use zerkalo_scene::disk::{Existing, Replacement, WriteError};
 
 /// Output of a film: a film file or a picture file.
 pub enum FilmOutput {
-    Film(PathBuf),
+    Film(PathBuf, Existing),
     /// Picture file with the bits per channel of a PNG.
     Picture(ImageOutput, Depth),
 }
 
 impl FilmOutput {
     /// Chooses the format by the extension of `path`, and checks that the file can be written.
-    pub fn new(path: &Path, depth: Depth) -> Result<Self, Failure> {
+    pub fn new(path: &Path, depth: Depth, existing: Existing) -> Result<Self, Failure> {
         if is_film(path) {
-            check_writable(path)?;
-            return Ok(Self::Film(path.to_path_buf()));
+            Replacement::begin(path, existing)?;
+            return Ok(Self::Film(path.to_path_buf(), existing));
         }
-        let output = ImageOutput::from_path(path)
+        let mut output = ImageOutput::from_path(path)
             .map_err(|error| Failure::Usage(format!("{error}; a film has the extension .zk")))?;
+        output.existing = existing;
         output.check_writable()?;
         Ok(Self::Picture(output, depth))
     }
@@ -37,7 +38,9 @@ impl FilmOutput {
     /// `header`. Returns the file with its lock.
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<File, WriteError> {
         match self {
-            Self::Film(path) => EncodedFilm::new(header, film, None).write(path, Existing::Replace),
+            Self::Film(path, existing) => {
+                EncodedFilm::new(header, film, None).write(path, *existing)
+            }
             Self::Picture(output, depth) => output.write(header, *depth, &mut &*film),
         }
     }

@@ -3,8 +3,11 @@
 use crate::command::args::PlanArgs;
 use crate::command::part_file::{self, FilmOutput};
 use crate::command::progress::style;
-use crate::command::{Failure, print_line, read_scene_and_warn, warn_of_precision};
-use indicatif::ProgressBar;
+use crate::command::{
+    Failure, is_quiet, print_json, print_line, read_scene_and_warn, warn_of_precision,
+};
+use indicatif::{ProgressBar, ProgressDrawTarget};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zerkalo_kernel::sampling::SampleSettings;
@@ -14,7 +17,7 @@ use zerkalo_render::film::{Estimator, Noise};
 use zerkalo_render::plan::{BASE, Part, PartShard, Plan, PlanSettings};
 use zerkalo_render::schedule::{Settings, Stop, USUAL_SLOPE};
 use zerkalo_render::{Options, SyncRender};
-use zerkalo_scene::disk::{self, check_writable};
+use zerkalo_scene::disk;
 
 /// Noise at which the pilot ends by default, divided by the noise target. With a ratio of 2, the
 /// pilot traces a third to a half of all rays, and the final noise differs from the target by at
@@ -22,7 +25,7 @@ use zerkalo_scene::disk::{self, check_writable};
 const PILOT: f64 = 2.0;
 
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
-    check_writable(&args.output)?;
+    args.clobber.check_writable(&args.output)?;
     let plan = match (&args.from, &args.scene) {
         (Some(film), _) => next_round(args, film)?,
         (None, Some(scene)) => by_pilot(args, scene)?,
@@ -33,6 +36,17 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     let (base, shards) = rays.split_at(1);
     let most = shards.iter().copied().fold(0.0, f64::max);
     let total: f64 = rays.iter().sum();
+    if args.json.json {
+        return print_json(&Planned {
+            plan: args.output.display().to_string(),
+            shards: plan.settings.shards,
+            spp: plan.spp(),
+            noise_levels: plan.predicted_levels,
+            rays: total,
+            base_rays: base[0],
+            largest_shard_rays: most,
+        });
+    }
     print_line(&format!(
         "{}  {} shards  {:.0} spp  expected noise {:.3} 8-bit levels",
         args.output.display(),
@@ -47,6 +61,18 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     ))
 }
 
+/// Results of `--json`. docs/command-line.md describes the keys.
+#[derive(Serialize)]
+struct Planned {
+    plan: String,
+    shards: u32,
+    spp: f64,
+    noise_levels: f64,
+    rays: f64,
+    base_rays: f64,
+    largest_shard_rays: f64,
+}
+
 /// Renders the pilot, an adaptive render to a coarser noise, and plans the remaining samples.
 fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let pilot_noise = args.pilot.unwrap_or(PILOT * args.noise);
@@ -57,7 +83,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         )));
     }
     let base_file = args.base.clone().unwrap_or_else(|| default_base(&args.output));
-    check_writable(&base_file)?;
+    args.clobber.check_writable(&base_file)?;
     let document = read_scene_and_warn(path)?;
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
@@ -90,20 +116,37 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         shards: vec![PartShard { number: BASE, complete: true }],
         rays: schedule.rays,
     };
-    let report = part_file::write(&FilmOutput::Film(base_file.clone()), state, &part)?.report;
-    print_line(&format!(
-        "{}  {}  {} rays  {:.2} s  (pilot, the base of the plan)",
-        base_file.display(),
-        part_file::summary(&report),
-        schedule.rays,
-        pilot.seconds
-    ))?;
+    let report = part_file::write(
+        &FilmOutput::Film(base_file.clone(), args.clobber.existing()),
+        state,
+        &part,
+    )?
+    .report;
+    announce(
+        args,
+        &format!(
+            "{}  {}  {} rays  {:.2} s  (pilot, the base of the plan)",
+            base_file.display(),
+            part_file::summary(&report),
+            schedule.rays,
+            pilot.seconds
+        ),
+    )?;
     Ok(Arc::unwrap_or_clone(part.plan))
+}
+
+/// Prints a line about the base of the plan.
+fn announce(args: &PlanArgs, line: &str) -> Result<(), Failure> {
+    if args.json.json { Ok(()) } else { print_line(line) }
 }
 
 /// Traces the pilot until it ends, and shows its noise.
 fn trace(pilot: &mut SyncRender, target: f64) {
-    let bar = ProgressBar::new_spinner().with_style(style("{spinner} {msg}  {elapsed}"));
+    let bar = ProgressBar::new_spinner();
+    if is_quiet() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    let bar = bar.with_style(style("{spinner} {msg}  {elapsed}"));
     while pilot.step().is_none() {
         if let Some(noise) = pilot.noise_levels() {
             bar.set_message(format!("pilot: noise {noise:.2} of {target} 8-bit levels"));
@@ -131,11 +174,14 @@ fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let schedule_settings = Settings { rays_per_pixel: cap, ..settings(args.noise) };
     let schedule = part.plan.schedule(&film, &estimator, schedule_settings);
     let schedule = schedule.ok_or_else(|| failed("it has no estimate of its noise"))?;
-    print_line(&format!(
-        "{}  noise {:.3} 8-bit levels (the base of the plan)",
-        path.display(),
-        schedule.noise.map_or(0.0, |noise: Noise| noise.rmse.levels)
-    ))?;
+    announce(
+        args,
+        &format!(
+            "{}  noise {:.3} 8-bit levels (the base of the plan)",
+            path.display(),
+            schedule.noise.map_or(0.0, |noise: Noise| noise.rmse.levels)
+        ),
+    )?;
     let settings = PlanSettings {
         noise_levels: args.noise,
         shards: args.shards,

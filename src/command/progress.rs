@@ -1,5 +1,6 @@
 //! Progress of a render on stderr: a bar in a terminal, otherwise lines for a log.
 
+use crate::command::is_quiet;
 use crate::dashboard::text::durations;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
@@ -26,7 +27,9 @@ pub enum Progress {
 
 impl Progress {
     pub fn on_stderr() -> Self {
-        if std::io::stderr().is_terminal() {
+        if is_quiet() {
+            Self::Lines(f64::INFINITY)
+        } else if std::io::stderr().is_terminal() {
             Self::Bar(None)
         } else {
             Self::Lines(FIRST_LINE_SECONDS)

@@ -5,12 +5,16 @@ use crate::command::checkpoints::CheckpointWriter;
 use crate::command::progress::{Progress, counts, noise};
 use crate::command::regions::Division;
 use crate::command::{
-    Failure, handle_signals, print_line, read_scene, save, shard, stats, warn, warn_of_precision,
+    Failure, STREAM, handle_signals, print_error, print_line, read_scene, save, shard, stats, warn,
+    warn_of_precision,
 };
-use std::io;
+use std::fmt::Display;
+use std::fs::File;
+use std::io::{self, ErrorKind, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tempfile::NamedTempFile;
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_render::export::{Provenance, film_header, scene_hash};
 use zerkalo_render::image_file::ImageOutput;
@@ -18,7 +22,7 @@ use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo_render::session::{Report, Session, State};
 use zerkalo_render::{Checkpoint, Options, RegionRender};
 use zerkalo_scene::Scene;
-use zerkalo_scene::disk::{self, Claim, WriteError, check_writable};
+use zerkalo_scene::disk::{self, Claim, WriteError};
 use zerkalo_terminal::Signals;
 
 /// Default noise target: half a quantisation step of an 8-bit file.
@@ -29,12 +33,121 @@ const POLL: Duration = Duration::from_millis(50);
 /// Time after a signal in which the first picture may still be completed.
 const FIRST_PICTURE: Duration = Duration::from_millis(400);
 
+/// Renders the scenes one after another. A scene that fails does not keep the others from being
+/// rendered.
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     if let Some(plan) = &args.plan {
         return shard::run(args, plan);
     }
-    let output =
-        ImageOutput::from_path(&args.output).map_err(|error| Failure::Usage(error.to_string()))?;
+    let scenes: Vec<_> = std::iter::once(&args.scene).chain(&args.more).collect();
+    let jobs: Result<Vec<_>, _> =
+        (1..).zip(&scenes).map(|(number, scene)| numbered(args, number, scene)).collect();
+    let (mut signals, mut failed) = (None, 0);
+    for job in jobs? {
+        let started = if args.more.is_empty() { started } else { Instant::now() };
+        match render(&job, started, &mut signals) {
+            Err(Failure::Failed(message)) if scenes.len() > 1 => {
+                print_error(&message);
+                failed += 1;
+            }
+            result => result?,
+        }
+    }
+    match failed {
+        0 => Ok(()),
+        n => Err(Failure::Failed(format!("{n} of {} scenes failed", scenes.len()))),
+    }
+}
+
+/// Returns the arguments of the render of one scene, with its `number` in the names of files.
+fn numbered(args: &RenderArgs, number: usize, scene: &Path) -> Result<RenderArgs, Failure> {
+    let mut job = RenderArgs { scene: scene.to_path_buf(), ..args.clone() };
+    let files = [&mut job.stats, &mut job.checkpoint, &mut job.resume];
+    for path in files.into_iter().flatten().chain([&mut job.output]) {
+        match with_number(path, number) {
+            Some(numbered) => *path = numbered,
+            None if args.more.is_empty() => {}
+            None => {
+                return Err(Failure::Usage(format!(
+                    "several scenes and one file, {}; expected %d for the number of the scene in \
+                     its name, such as picture-%04d.png",
+                    path.display()
+                )));
+            }
+        }
+    }
+    Ok(job)
+}
+
+/// Replaces `%d` in a file name by `number`, with leading zeros for `%04d`. `None` without `%d`.
+fn with_number(path: &Path, number: usize) -> Option<PathBuf> {
+    let text = path.to_str()?;
+    text.match_indices('%').find_map(|(at, _)| {
+        let (digits, rest) = text[at + 1..].split_once('d')?;
+        let is_width = digits.len() < 3 && digits.bytes().all(|b| b.is_ascii_digit());
+        let width = digits.parse().unwrap_or(0);
+        is_width.then(|| format!("{}{number:0width$}{rest}", &text[..at]).into())
+    })
+}
+
+/// Picture file to be written, or stdout.
+struct Target {
+    output: ImageOutput,
+    /// File whose content goes to stdout when it is complete; `None` for a picture file.
+    temporary: Option<NamedTempFile>,
+}
+
+impl Target {
+    fn of(args: &RenderArgs) -> Result<Self, Failure> {
+        let usage = |error: &dyn Display| Failure::Usage(error.to_string());
+        if args.output != Path::new(STREAM) {
+            let output = match &args.format {
+                Some(format) => ImageOutput::of_format(args.output.clone(), format),
+                None => ImageOutput::from_path(&args.output),
+            };
+            let mut output = output.map_err(|error| usage(&error))?;
+            output.existing = args.clobber.existing();
+            return Ok(Self { output, temporary: None });
+        }
+        if io::stdout().is_terminal() {
+            let message = "a picture is not written to a terminal; add `> FILE` or `| PROGRAM`, or \
+                           name a file";
+            return Err(usage(&message));
+        }
+        let temporary = NamedTempFile::new()?;
+        let format = args.format.as_deref().unwrap_or("png");
+        let output = ImageOutput::of_format(temporary.path().to_path_buf(), format)?;
+        Ok(Self { output, temporary: Some(temporary) })
+    }
+
+    /// Copies the picture to stdout and prints `summary`: on stdout if the picture is in a file.
+    /// A reader that closes the pipe early is not an error.
+    fn deliver(&self, summary: &str) -> Result<(), Failure> {
+        if self.temporary.is_none() {
+            return print_line(summary);
+        }
+        let copied = File::open(&self.output.path)
+            .and_then(|mut picture| io::copy(&mut picture, &mut io::stdout()));
+        match copied {
+            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+                Err(Failure::Failed(format!("cannot write to stdout: {error}")))
+            }
+            _ => {
+                warn(summary);
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Renders the scene of `args`. `signals` are handled from the first render on.
+fn render(
+    args: &RenderArgs,
+    started: Instant,
+    signals: &mut Option<Signals>,
+) -> Result<(), Failure> {
+    let target = Target::of(args)?;
+    let output = &target.output;
     let document = read_scene(&args.scene)?;
     let warnings = document.warnings.clone();
     let hash = scene_hash(document.text(), document.scene());
@@ -44,13 +157,16 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     // Faulty paths are reported before the render starts.
-    check_outputs(args, &output)?;
+    check_outputs(args, output)?;
     let claim = args.checkpoint.as_deref().map(save::claim).transpose()?;
     let checkpoint = read_checkpoint(args)?;
     for warning in warnings {
         warn(&format!("warning: {warning}"));
     }
-    let signals = handle_signals()?;
+    let signals = match signals {
+        Some(signals) => signals,
+        None => signals.insert(handle_signals()?),
+    };
     let sampling = SampleSettings { seed: args.compute.seed, kind: args.sampler };
     let mut options =
         Options::new(args.precision.precision, sampling, args.picture.display(&scene));
@@ -66,13 +182,13 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     };
     warn_of_precision(&scene, &options.world);
     options.world.merge_lights = division.is_some_and(|division| division.merge_lights);
-    let job = Job { args, scene, options, output: &output, provenance, signals, started };
+    let job = Job { args, scene, options, output, provenance, signals, started };
     let rendered = match division.filter(|division| division.regions.count > 1) {
         Some(division) => in_regions(job, division.regions.rows)?,
         None => as_a_whole(job, claim, checkpoint)?,
     };
     let end = rendered.end;
-    let printed = print_line(&summary(&output.path, size, &rendered.report, end));
+    let printed = target.deliver(&summary(&args.output, size, &rendered.report, end));
     if let Some(path) = &args.stats {
         let stats = stats::json(args, &hash, size, &rendered, started.elapsed());
         disk::write(path, stats.as_bytes())?;
@@ -89,7 +205,7 @@ struct Job<'a> {
     options: Options,
     output: &'a ImageOutput,
     provenance: Provenance,
-    signals: Signals,
+    signals: &'a Signals,
     started: Instant,
 }
 
@@ -119,7 +235,7 @@ fn as_a_whole(
 ) -> Result<Rendered, Failure> {
     let Job { args, scene, options, output, provenance, signals, started } = job;
     let threads = args.compute.threads();
-    let mut session = Session::new(threads, options, schedule_settings(args))?;
+    let mut session = Session::new(threads, options, schedule_settings(args, output))?;
     match checkpoint {
         Some(checkpoint) => resume(&mut session, Arc::new(scene), checkpoint),
         None => drop(session.set_scene(Arc::new(scene))),
@@ -129,7 +245,7 @@ fn as_a_whole(
         let interval = Duration::from_secs_f64(args.checkpoint_interval.min(1e9));
         CheckpointWriter::new(claim, interval, provenance.clone())
     });
-    let end = watch(&session, &signals, checkpoints.as_mut())?;
+    let end = watch(&session, signals, checkpoints.as_mut())?;
     // The checkpoint comes first: the picture can be written again from its samples, if the program
     // is killed soon after a signal. Its error is returned after the picture has been written.
     let kept = checkpoints.map_or(Ok(()), |checkpoints| checkpoints.finish(&session));
@@ -161,7 +277,7 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
         signal = signals.caught();
         signal.map_or(Ok(()), |_| Err(io::Error::other("stopped by a signal")))
     };
-    let (scene, settings) = (Arc::new(scene), schedule_settings(args));
+    let (scene, settings) = (Arc::new(scene), schedule_settings(args, output));
     let threads = args.compute.threads();
     let mut render = RegionRender::new(&scene, &options, settings, rows, threads)?;
     let results = render.write(&provenance, args.bits, output, &mut observe);
@@ -179,9 +295,9 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
             Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept: Ok(()) })
         }
         (Err(_), Some(status)) => {
-            warn(&format!(
+            print_error(&format!(
                 "stopped by a signal: {} is not written, because regions are missing",
-                output.path.display()
+                args.output.display()
             ));
             Err(Failure::Signalled(status))
         }
@@ -205,7 +321,7 @@ fn watch(
             }
             let caught: &mut Instant = caught.get_or_insert_with(Instant::now);
             if caught.elapsed() >= FIRST_PICTURE {
-                warn("stopped by a signal before the first picture: nothing is written");
+                print_error("stopped by a signal before the first picture: nothing is written");
                 break Err(Failure::Signalled(status));
             }
         }
@@ -259,19 +375,18 @@ fn check_outputs(args: &RenderArgs, output: &ImageOutput) -> Result<(), Failure>
         }
     }
     output.check_writable()?;
-    args.stats.as_deref().map(check_writable).transpose()?;
+    args.stats.as_deref().map(|path| args.clobber.check_writable(path)).transpose()?;
     match &args.checkpoint {
         Some(path) => CheckpointWriter::check(path, args.resume.as_deref()),
         None => Ok(()),
     }
 }
 
-fn schedule_settings(args: &RenderArgs) -> Settings {
+fn schedule_settings(args: &RenderArgs, output: &ImageOutput) -> Settings {
     let has_target =
         args.spp.is_some() || args.noise.is_some() || args.rmse.is_some() || args.time.is_some();
     let noise_levels = if has_target { args.noise } else { Some(DEFAULT_NOISE_LEVELS) };
-    let linear_file = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    let linear = noise_levels.is_none() && (args.rmse.is_some() || linear_file);
+    let linear = noise_levels.is_none() && (args.rmse.is_some() || output.is_linear());
     let criterion = if linear { Criterion::Linear } else { Criterion::Levels };
     let stop = Stop { spp: args.spp, noise_levels, rmse_linear: args.rmse, seconds: args.time };
     Settings { criterion, ..Settings::new(!args.uniform, stop) }

@@ -38,7 +38,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
         }
         None => (BASE..=plan.settings.shards).collect(),
     };
-    let output = FilmOutput::new(&args.output, args.bits)?;
+    let output = FilmOutput::new(&args.output, args.bits, args.clobber.existing())?;
     let document = read_scene(&args.scene)?;
     let found = scene_hash(document.text(), document.scene());
     if found != plan.settings.scene_hash {
@@ -71,7 +71,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
         Ok(written.report)
     };
     let mut checkpoint = |render: &ShardRender| match output {
-        FilmOutput::Film(_) => write(render, false).map(drop),
+        FilmOutput::Film(..) => write(render, false).map(drop),
         FilmOutput::Picture(..) => Ok(()),
     };
     let signal = trace(&mut render, &signals, &mut checkpoint);

@@ -18,7 +18,7 @@ fn usage_errors_have_status_2_and_touch_nothing() {
         (&["render", "scene.toml", "-o", "a.png", "--stats", "a.png"], "same file"),
         (
             &["rendr", "scene.toml"],
-            "`rendr` is no command; commands: render, plan, merge, watch, measure, check, info, new, doctor",
+            "`rendr` is no command; did you mean `render`?; commands: render, plan, merge, watch, measure, check, info, compare, scenes, new, doctor",
         ),
         (&["polish"], "zerkalo render polish"),
         (&[], "zerkalo render"),

@@ -1,8 +1,8 @@
 //! Export of pictures as files, with metadata about their origin. The metadata hold no dates,
 //! durations or numbers of threads, so that equal pictures have equal metadata.
 
-use crate::film::Display;
 use crate::film::file::FilmFileHeader;
+use crate::film::{ByMeasure, Display, Tone};
 use crate::render_state::RenderState;
 use crate::session::Report;
 use zerkalo_kernel::sampling::SamplerKind;
@@ -103,6 +103,20 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
         ("Saturated samples", report.saturated_samples.to_string()),
         ("Saturated pixels", report.saturated_pixels.to_string()),
     ]
+}
+
+/// Parses the display transform in the value of the metadata entry `Settings`.
+pub fn display_of_text(settings: &str) -> Option<Display> {
+    let (_, display) = settings.split_once(DISPLAY)?;
+    let (exposure, tone) = display.split_once(" EV, tone ")?;
+    Some(Display { exposure_ev: exposure.parse().ok()?, tone: Tone::from_name(tone)? })
+}
+
+/// Parses the value of the metadata entry `Noise`; `None` if the noise is unknown.
+pub fn noise_of_text(text: &str) -> Option<ByMeasure> {
+    let (levels, rest) = text.split_once(" 8-bit levels")?;
+    let (_, linear) = rest.split_once("linear RMSE ")?;
+    Some(ByMeasure { levels: levels.parse().ok()?, linear: linear.parse().ok()? })
 }
 
 /// Updates the metadata of `header`: samples and noise from `report`, the display transform from

@@ -17,6 +17,8 @@ pub struct Diagnostic {
     pub found: String,
     /// Expected value and remedy, in sentences; may be empty.
     pub help: String,
+    /// Line of the scene file above a line with a caret below the column; empty without a location.
+    pub excerpt: String,
 }
 
 /// Largest indentation of the second line of a printed diagnostic [characters].
@@ -110,6 +112,18 @@ impl FirstDiagnostics {
     }
 }
 
+/// Largest number of characters of a line that an excerpt shows.
+const EXCERPT: usize = 100;
+
+/// Returns the text of line `number` and a caret below its `column`.
+fn excerpt(line: &str, number: usize, column: usize) -> String {
+    let skipped = column.saturating_sub(EXCERPT * 2 / 3);
+    let visible = |c: char| if c.is_control() { ' ' } else { c };
+    let shown: String = line.chars().skip(skipped).take(EXCERPT).map(visible).collect();
+    let width = column - skipped;
+    format!("{number:>5} | {}\n      | {:>width$}", sanitized(shown.trim_end()), "^")
+}
+
 /// Largest number of diagnostics that are printed at once.
 const MAX_SHOWN: usize = 20;
 
@@ -127,18 +141,40 @@ impl SceneErrors {
     }
 }
 
+impl SceneErrors {
+    /// Adds the lines of `text`, the file, to the messages.
+    pub(super) fn quoting(mut self, text: &str) -> Self {
+        let text = text.trim_start_matches('\u{feff}');
+        let mut lines = (1..).zip(text.lines()).peekable();
+        for message in &mut self.messages {
+            let Some((number, column)) = message.line_column else { continue };
+            while lines.next_if(|(n, _)| *n < number).is_some() {}
+            let line = lines.peek().filter(|(n, line)| *n == number && !line.trim().is_empty());
+            message.excerpt = line.map_or(String::new(), |(n, line)| excerpt(line, *n, column));
+        }
+        self
+    }
+
+    /// Formats the errors, each followed by its line of the scene file with a caret.
+    pub fn with_excerpts(&self) -> String {
+        self.list(|message| match &*message.excerpt {
+            "" => message.to_string(),
+            excerpt => format!("{message}\n{excerpt}"),
+        })
+    }
+
+    fn list(&self, shown: impl Fn(&Diagnostic) -> String) -> String {
+        let first = self.messages.iter().take(MAX_SHOWN).map(shown).collect::<Vec<_>>().join("\n");
+        match self.messages.len().saturating_sub(MAX_SHOWN) + self.more {
+            0 => first,
+            more => format!("{first}\n… and {more} more."),
+        }
+    }
+}
+
 impl fmt::Display for SceneErrors {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        for (i, message) in self.messages.iter().take(MAX_SHOWN).enumerate() {
-            if i > 0 {
-                f.write_str("\n")?;
-            }
-            message.fmt(f)?;
-        }
-        match self.messages.len().saturating_sub(MAX_SHOWN) + self.more {
-            0 => Ok(()),
-            more => write!(f, "\n… and {more} more."),
-        }
+        f.write_str(&self.list(ToString::to_string))
     }
 }
 

@@ -41,7 +41,10 @@ impl Document {
     }
 
     /// Reads a scene file like [`Document::read`], once it was opened as `file`.
-    pub(super) fn read_opened(
+    ///
+    /// # Errors
+    /// Returns the same errors as [`Scene::read`].
+    pub fn read_opened(
         path: &Path,
         file: io::Result<File>,
         assets: Arc<Assets>,
@@ -57,7 +60,8 @@ impl Document {
     }
 
     fn parse_in(text: String, name: &str, resolver: AssetResolver) -> Result<Self, SceneErrors> {
-        let source = SourceScene::parse(&text, name, resolver)?;
+        let source =
+            SourceScene::parse(&text, name, resolver).map_err(|errors| errors.quoting(&text))?;
         let warnings = source.warnings();
         let scene = Arc::new(source.scene);
         let text = Arc::new(text);

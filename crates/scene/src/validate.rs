@@ -3,10 +3,9 @@
 use crate::Scene;
 use crate::asset::{AssetKind, Assets};
 use crate::diagnostic::MAX_REPORTED;
-use crate::format::suggest::did_you_mean;
 use crate::light::Light;
 use crate::material::Mapping;
-use crate::value::{KeyNode, ValidationError, truncated};
+use crate::value::{KeyNode, ValidationError, did_you_mean, truncated};
 use std::borrow::Cow;
 use std::cell::LazyCell;
 use std::collections::HashMap;

@@ -1,6 +1,6 @@
 //! Drawing of the model into a buffer of terminal cells. The cells of the picture are cached.
 
-mod false_color;
+pub mod false_color;
 mod fields;
 mod frame;
 mod ground_grid;

@@ -62,18 +62,29 @@ impl ImageOutput {
     /// Creates an output for `path`, whose extension chooses the format. Accesses no file.
     pub fn from_path(path: impl Into<PathBuf>) -> Result<Self, WriteError> {
         let path = path.into();
-        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        let extension = path.extension().unwrap_or_default().to_string_lossy().into_owned();
+        Self::of_format(path, &extension)
+    }
+
+    /// Creates an output for `path` in the format whose files have the given extension. Accesses no
+    /// file.
+    pub fn of_format(path: PathBuf, extension: &str) -> Result<Self, WriteError> {
         let is_known = |format: &Format| extension.eq_ignore_ascii_case(format.extension);
         if let Some(format) = FORMATS.iter().position(is_known) {
             return Ok(Self { path, format, existing: Existing::Replace });
         }
-        let what = match &*extension {
+        let what = match extension {
             "" => "its name has no extension that names the picture format".to_string(),
             extension => format!("no picture format has the extension .{extension}"),
         };
         let known = FORMATS.iter().map(|format| format!(".{}", format.extension));
         let remedy = format!("known extensions: {}", known.collect::<Vec<_>>().join(", "));
         Err(WriteError::new(&path, ErrorKind::InvalidFilename, what, &remedy))
+    }
+
+    /// Returns `true` if the format stores linear radiance.
+    pub fn is_linear(&self) -> bool {
+        FORMATS[self.format].extension == "exr"
     }
 
     /// Checks, before a long render, that the file can be written.

@@ -5,6 +5,7 @@ use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::text::Lines;
 use crate::disk::open_regular;
 use crate::process_memory::megabytes;
+use crate::value::nearest_file;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
@@ -96,7 +97,11 @@ fn open(path: &Path) -> Result<File, AssetError> {
 /// Converts an I/O error that occurred while the file at `path` was read.
 pub fn read_error(path: &Path, error: &std::io::Error) -> AssetError {
     let (found, expected) = match error.kind() {
-        ErrorKind::NotFound => ("there is no such file".to_string(), "the path of a file"),
+        ErrorKind::NotFound => {
+            let near = nearest_file(path).map(|near| format!("the path of a file, such as {near}"));
+            let expected = near.unwrap_or_else(|| "the path of a file".to_string());
+            return AssetError::of_file(path, "there is no such file", &expected);
+        }
         ErrorKind::PermissionDenied => {
             ("permission to read the file is denied".to_string(), "a file that may be read")
         }

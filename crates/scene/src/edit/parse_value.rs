@@ -1,8 +1,9 @@
 //! Parsing and formatting of property values as users type and read them.
 
 use crate::edit::EditError;
-use crate::format::suggest::did_you_mean;
-use crate::value::{Color, Field, KeyValue, NumberRange, ValueType, number, sanitized, truncated};
+use crate::value::{
+    Color, Field, KeyValue, NumberRange, ValueType, did_you_mean, number, sanitized, truncated,
+};
 
 /// Parses `text` as a value of `field`. The ranges of numbers that are not whole are checked later.
 pub(super) fn parse(field: &Field, text: &str) -> Result<KeyValue, EditError> {

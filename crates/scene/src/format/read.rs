@@ -5,7 +5,7 @@ use crate::format::parts::{PART_BYTES, Part, split};
 use crate::format::schema;
 use crate::format::source_map::{line_column, locate};
 use crate::process_memory::missing_memory;
-use crate::value::{FieldValue, written};
+use crate::value::{FieldValue, nearest_file, written};
 use crate::{AssetResolver, Document, Scene};
 use std::fs::File;
 use std::io::{self, Read};
@@ -166,7 +166,9 @@ pub(crate) fn read_text(path: &Path, file: io::Result<File>) -> Result<String, S
     let fail = |found: &str, help: &str| SceneErrors::at(&name, None, found.to_string(), help);
     let io = |error: std::io::Error| match error.kind() {
         std::io::ErrorKind::NotFound => {
-            fail("there is no such file", "`zerkalo new FILE` writes a scene to start from.")
+            let near = nearest_file(path).map(|near| format!(" Did you mean {near}?"));
+            let help = "`zerkalo new FILE` writes a scene to start from.";
+            fail("there is no such file", &(help.to_string() + &near.unwrap_or_default()))
         }
         std::io::ErrorKind::PermissionDenied => {
             fail("permission to read the file is denied", "Check who may read it.")

@@ -5,12 +5,12 @@ use crate::camera;
 use crate::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::format::parts::Part;
 use crate::format::source_map::subject_in;
-use crate::format::suggest::{did_you_mean, nearest};
 use crate::light::{self, LightKind};
 use crate::material;
+use crate::shape;
 use crate::value::{
-    DefaultValue, Description, Field, KeyNode, PRESET, ValueType, integer, names, read_value,
-    sort_by_number, truncated,
+    Color, DefaultValue, Description, Field, KeyNode, PRESET, ValueType, did_you_mean, integer,
+    names, nearest, read_value, sort_by_number, translated, truncated,
 };
 use crate::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
 use std::ops;
@@ -156,10 +156,35 @@ impl SchemaReader<'_> {
             return None;
         }
         let known = || fields.iter().map(|f| f.name);
-        let help = format!("Known: {}.{}", names(fields), did_you_mean(key.get_ref(), known()));
+        let help = format!("Known: {}.{}", names(fields), Self::intended(key.get_ref(), fields));
         let found = format!("unknown key \"{}\"{}", truncated(key.get_ref()), self.place());
         self.add(key.span(), found, help);
         nearest(key.get_ref(), known())
+    }
+
+    /// Returns a sentence with what the unknown key `given` of a table with the keys `fields` was
+    /// probably meant to be; empty if that is unclear.
+    fn intended(given: &str, fields: &[Field]) -> String {
+        let has = |fields: &[Field]| fields.iter().any(|field| field.name == given);
+        let of_object = fields.iter().any(|field| field.name == "shape");
+        if of_object && has(shape::KINDS) {
+            return format!(" Expected shape.{given} instead of {given}.");
+        }
+        let meant = did_you_mean(given, fields.iter().map(|field| field.name));
+        if !meant.is_empty() {
+            return meant;
+        }
+        let tables: [(&[Field], &str); 5] = [
+            (material::FIELDS, "[materials.NAME]"),
+            (Object::FIELDS, "[[object]]"),
+            (light::FIELDS, "[[light]]"),
+            (camera::FIELDS, "[camera]"),
+            (FilmSettings::FIELDS, "[film]"),
+        ];
+        match tables.iter().find(|(fields, _)| has(fields)) {
+            Some((_, table)) => format!(" It is a key of {table}."),
+            None => translated(given),
+        }
     }
 
     /// Reads a table with the keys `fields`, whose byte range is `span`, into `node`.
@@ -298,6 +323,19 @@ impl SchemaReader<'_> {
                 let intended = did_you_mean(word, choices.iter().map(|c| c.name));
                 let help = format!("Expected {takes}.{intended}");
                 self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
+            }
+            (ValueType::Color(_), DeValue::String(text)) => {
+                let meant = Color::typed(text).map(|color| match color.to_hex() {
+                    Some(code) => format!(" Did you mean \"{code}\"?"),
+                    None => format!(" Did you mean {:?}?", color.0),
+                });
+                let help = format!("Expected {takes}.{}", meant.unwrap_or_default());
+                self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
+            }
+            (ValueType::Number(_), DeValue::Array(_) | DeValue::String(_))
+                if self.path.last().is_some_and(|key| key == "emission") =>
+            {
+                self.wrong(span, value, &format!("{takes}; its colour is emission_color"));
             }
             (ValueType::Tables(_), _) if self.path.len() == 1 => {
                 let expected = format!("tables that begin with [[{}]]", self.path[0]);
