@@ -13,10 +13,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_render::export::{Provenance, film_header, scene_hash};
-use zerkalo_render::image_file::ImageOutput;
+use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo_render::session::{Report, Session, State};
-use zerkalo_render::{Checkpoint, Options, RegionRender};
+use zerkalo_render::{Checkpoint, ErrorTarget, Options, ROUNDING_TO_8_BITS, RegionRender};
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::{self, Claim, WriteError, check_writable};
 use zerkalo_terminal::Signals;
@@ -71,7 +71,8 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         None => as_a_whole(job, claim, checkpoint)?,
     };
     let end = rendered.end;
-    let printed = print_line(&summary(&output.path, size, &rendered.report, end));
+    let printed = print_line(&summary(&output.path, size, &rendered.report, end))
+        .and_then(|()| print_line(&error_line(args, &rendered.report, end)));
     if let Some(path) = &args.stats {
         let stats = stats::json(args, &hash, size, &rendered, started.elapsed());
         disk::write(path, stats.as_bytes())?;
@@ -135,12 +136,15 @@ fn as_a_whole(
     let writing = Instant::now();
     let results = save::persist(|| {
         let (depth, output, provenance) = (args.bits, output.clone(), provenance.clone());
+        let quantization = quantization(args);
         let results = session.with(move |state, report| {
-            let header = film_header(state, report, &provenance);
+            let mut report = report.clone();
+            report.error.iter_mut().for_each(|error| error.quantization = quantization);
+            let header = film_header(state, &report, &provenance);
             let world = state.world.info();
             output
                 .write(&header, depth, &mut &state.film)
-                .map(|_| (report.clone(), world.precision, world.biases.clone()))
+                .map(|_| (report, world.precision, world.biases.clone()))
         });
         results.transpose()
     });
@@ -265,14 +269,30 @@ fn check_outputs(args: &RenderArgs, output: &ImageOutput) -> Result<(), Failure>
     }
 }
 
+/// Returns the RMSE of rounding to the integers of the picture file, in 8-bit levels.
+fn quantization(args: &RenderArgs) -> f64 {
+    match args.bits {
+        _ if is_linear(args) => 0.0,
+        Depth::Eight => ROUNDING_TO_8_BITS,
+        Depth::Sixteen => ROUNDING_TO_8_BITS / 257.0,
+    }
+}
+
+fn is_linear(args: &RenderArgs) -> bool {
+    args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"))
+}
+
 fn schedule_settings(args: &RenderArgs) -> Settings {
+    let errors = [args.noise, args.rmse, args.error];
     let has_target =
-        args.spp.is_some() || args.noise.is_some() || args.rmse.is_some() || args.time.is_some();
+        args.spp.is_some() || args.time.is_some() || errors.iter().any(Option::is_some);
     let noise_levels = if has_target { args.noise } else { Some(DEFAULT_NOISE_LEVELS) };
-    let linear_file = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    let linear = noise_levels.is_none() && (args.rmse.is_some() || linear_file);
+    let linear =
+        noise_levels.is_none() && args.error.is_none() && (args.rmse.is_some() || is_linear(args));
     let criterion = if linear { Criterion::Linear } else { Criterion::Levels };
-    let stop = Stop { spp: args.spp, noise_levels, rmse_linear: args.rmse, seconds: args.time };
+    let error = args.error.map(|levels| ErrorTarget { levels, quantization: quantization(args) });
+    let stop =
+        Stop { spp: args.spp, noise_levels, rmse_linear: args.rmse, error, seconds: args.time };
     Settings { criterion, ..Settings::new(!args.uniform, stop) }
 }
 
@@ -289,4 +309,18 @@ fn summary(path: &Path, size: [u32; 2], report: &Report, end: End) -> String {
         Ok(_) => {}
     }
     text
+}
+
+/// Formats the error with its parts. If `--error` has ended the render, adds the largest part, and
+/// whether the target was met.
+fn error_line(args: &RenderArgs, report: &Report, end: End) -> String {
+    let Some(error) = &report.error else { return "error unknown".to_string() };
+    let text = error.to_string();
+    match args.error.filter(|_| end == Ok(StoppedBy::Error)) {
+        Some(target) if error.is_open() || error.total() > target => {
+            format!("{text}\nerror {target} is not met: the largest part is {}", error.largest())
+        }
+        Some(_) => format!("{text}  (largest part: {})", error.largest()),
+        None => text,
+    }
 }

@@ -87,7 +87,7 @@ const SETTINGS: &str = "Settings";
 const DISPLAY: &str = ", exposure ";
 
 /// Returns the metadata entries about samples and noise.
-fn film_entries(report: &Report) -> [(&'static str, String); 5] {
+fn film_entries(report: &Report) -> [(&'static str, String); 6] {
     let spp = &report.spp;
     let noise = match report.noise {
         Some(n) => format!(
@@ -99,6 +99,7 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     [
         ("Samples per pixel", format!("{:.2} ({}-{})", spp.mean, spp.min, spp.max)),
         ("Noise", noise),
+        ("Error", report.error.as_ref().map_or("unknown".to_string(), |error| error.to_string())),
         ("Bad samples", report.bad_samples.to_string()),
         ("Saturated samples", report.saturated_samples.to_string()),
         ("Saturated pixels", report.saturated_pixels.to_string()),
