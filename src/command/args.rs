@@ -150,8 +150,8 @@ pub enum Command {
 /// Arguments of `zerkalo render`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "Rendering stops at whichever of --spp, --noise, --rmse and --time is reached \
-                        first; with none of them, at --noise 0.5."
+    after_help = "Rendering stops at whichever of --spp, --noise, --rmse, --error and --time is \
+                        reached first; with none of them, at --noise 0.5."
 )]
 pub struct RenderArgs {
     /// The scene file; - for stdin, :NAME for a built-in scene (`zerkalo scenes` lists them)
@@ -179,6 +179,10 @@ pub struct RenderArgs {
     /// Stop at this estimated RMSE of the linear picture
     #[arg(long, value_name = "LINEAR", value_parser = positive, allow_negative_numbers = true)]
     pub rmse: Option<f64>,
+    /// Stop at this error of the displayed picture, in 8-bit levels: noise, rounding, cut paths and
+    /// 8 bits together. Chooses double precision where single is not enough
+    #[arg(long, value_name = "LEVELS", value_parser = positive, conflicts_with_all = ["noise", "rmse", "memory"], allow_negative_numbers = true)]
+    pub error: Option<f64>,
     /// Stop after this many seconds of rendering
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub time: Option<f64>,
@@ -196,7 +200,7 @@ pub struct RenderArgs {
     #[arg(long)]
     pub uniform: bool,
     /// Trace the samples of a plan, which `zerkalo plan` has written
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "exposure", "tone", "spp", "noise", "rmse", "time", "seed", "precision", "sampler", "uniform", "stats"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "exposure", "tone", "spp", "noise", "rmse", "error", "time", "seed", "precision", "sampler", "uniform", "stats"])]
     pub plan: Option<PathBuf>,
     /// Trace only this shard of the plan, into a .zk file; 0 is the base, the pilot's samples
     #[arg(

@@ -17,10 +17,10 @@ use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_render::export::{Provenance, film_header, scene_hash};
-use zerkalo_render::image_file::ImageOutput;
+use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo_render::session::{Report, Session, State};
-use zerkalo_render::{Checkpoint, Options, RegionRender};
+use zerkalo_render::{Checkpoint, ErrorTarget, Options, ROUNDING_TO_8_BITS, RegionRender};
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::{self, Claim, WriteError};
 use zerkalo_terminal::Signals;
@@ -188,7 +188,9 @@ fn render(
         None => as_a_whole(job, claim, checkpoint)?,
     };
     let end = rendered.end;
-    let printed = target.deliver(&summary(&args.output, size, &rendered.report, end));
+    let error = error_line(args, &rendered.report, end);
+    let printed = target
+        .deliver(&format!("{}\n{error}", summary(&args.output, size, &rendered.report, end)));
     if let Some(path) = &args.stats {
         let stats = stats::json(args, &hash, size, &rendered, started.elapsed());
         disk::write(path, stats.as_bytes())?;
@@ -251,13 +253,16 @@ fn as_a_whole(
     let kept = checkpoints.map_or(Ok(()), |checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
     let results = save::persist(|| {
+        let quantization = quantization(args, output);
         let (depth, output, provenance) = (args.bits, output.clone(), provenance.clone());
         let results = session.with(move |state, report| {
-            let header = film_header(state, report, &provenance);
+            let mut report = report.clone();
+            report.error.iter_mut().for_each(|error| error.quantization = quantization);
+            let header = film_header(state, &report, &provenance);
             let world = state.world.info();
             output
                 .write(&header, depth, &mut &state.film)
-                .map(|_| (report.clone(), world.precision, world.biases.clone()))
+                .map(|_| (report, world.precision, world.biases.clone()))
         });
         results.transpose()
     });
@@ -382,13 +387,27 @@ fn check_outputs(args: &RenderArgs, output: &ImageOutput) -> Result<(), Failure>
     }
 }
 
+/// Returns the RMSE of rounding to the integers of the picture file, in 8-bit levels.
+fn quantization(args: &RenderArgs, output: &ImageOutput) -> f64 {
+    match args.bits {
+        _ if output.is_linear() => 0.0,
+        Depth::Eight => ROUNDING_TO_8_BITS,
+        Depth::Sixteen => ROUNDING_TO_8_BITS / 257.0,
+    }
+}
+
 fn schedule_settings(args: &RenderArgs, output: &ImageOutput) -> Settings {
+    let errors = [args.noise, args.rmse, args.error];
     let has_target =
-        args.spp.is_some() || args.noise.is_some() || args.rmse.is_some() || args.time.is_some();
+        args.spp.is_some() || args.time.is_some() || errors.iter().any(Option::is_some);
     let noise_levels = if has_target { args.noise } else { Some(DEFAULT_NOISE_LEVELS) };
-    let linear = noise_levels.is_none() && (args.rmse.is_some() || output.is_linear());
+    let linear = noise_levels.is_none()
+        && args.error.is_none()
+        && (args.rmse.is_some() || output.is_linear());
     let criterion = if linear { Criterion::Linear } else { Criterion::Levels };
-    let stop = Stop { spp: args.spp, noise_levels, rmse_linear: args.rmse, seconds: args.time };
+    let error = args.error.map(|levels| ErrorTarget { levels, quantization: quantization(args, output) });
+    let stop =
+        Stop { spp: args.spp, noise_levels, rmse_linear: args.rmse, error, seconds: args.time };
     Settings { criterion, ..Settings::new(!args.uniform, stop) }
 }
 
@@ -405,4 +424,18 @@ fn summary(path: &Path, size: [u32; 2], report: &Report, end: End) -> String {
         Ok(_) => {}
     }
     text
+}
+
+/// Formats the error with its parts. If `--error` has ended the render, adds the largest part, and
+/// whether the target was met.
+fn error_line(args: &RenderArgs, report: &Report, end: End) -> String {
+    let Some(error) = &report.error else { return "error unknown".to_string() };
+    let text = error.to_string();
+    match args.error.filter(|_| end == Ok(StoppedBy::Error)) {
+        Some(target) if error.is_open() || error.total() > target => {
+            format!("{text}\nerror {target} is not met: the largest part is {}", error.largest())
+        }
+        Some(_) => format!("{text}  (largest part: {})", error.largest()),
+        None => text,
+    }
 }

@@ -4,6 +4,7 @@ use crate::command::args::RenderArgs;
 use crate::command::render::Rendered;
 use serde_json::json;
 use std::time::Duration;
+use zerkalo_render::ErrorParts;
 use zerkalo_render::schedule::StoppedBy;
 use zerkalo_scene::process_memory::resident_memory;
 
@@ -19,6 +20,7 @@ pub fn json(
     total: Duration,
 ) -> String {
     let report = &rendered.report;
+    let error = report.error.as_ref();
     let first_picture = report.first_picture_seconds;
     let stats = json!({
         "scene": args.scene.display().to_string(),
@@ -49,6 +51,15 @@ pub fn json(
         "noise_levels": report.noise.map(|n| n.rmse.levels),
         "noise_levels_p95": report.noise.map(|n| n.p95_levels),
         "rmse_linear": report.noise.map(|n| n.rmse.linear),
+        // Parts of the error in 8-bit levels. Null if they have no bound or were not measured.
+        "error_levels": error.filter(|e| !e.is_open()).map(ErrorParts::total),
+        "rounding_levels": error.and_then(|e| e.rounding),
+        "cut_paths_levels": error.and_then(|e| e.cut_paths).filter(|levels| levels.is_finite()),
+        "quantization_levels": error.map(|e| e.quantization),
+        "left_out": error.map(|e| &e.left_out),
+        "probe_seconds": report.probe_seconds[0],
+        // Seconds of compiling the scene in double precision for the error probes.
+        "probe_compile_seconds": report.probe_seconds[1],
         "bad_samples": report.bad_samples,
         "saturated_samples": report.saturated_samples,
         "saturated_pixels": report.saturated_pixels,

@@ -132,7 +132,8 @@ fn a14_threads() {
 /// Width and height in pixels of the pictures after edits.
 const SMALL: [u32; 2] = [40, 30];
 /// Stop criterion of the pictures after edits.
-const SPP: Stop = Stop { spp: Some(8), noise_levels: None, rmse_linear: None, seconds: None };
+const SPP: Stop =
+    Stop { spp: Some(8), noise_levels: None, rmse_linear: None, error: None, seconds: None };
 
 /// Client of a session, which renders scenes on its own thread while they are edited.
 struct Desk {

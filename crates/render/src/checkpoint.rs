@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_scene::Scene;
-use zerkalo_world::{self as world, AnyWorld};
+use zerkalo_world::{self as world, AnyWorld, Precision};
 
 const SCENE: Tag = *b"SCEN";
 const SCHEDULE: Tag = *b"SCHD";
@@ -157,7 +157,13 @@ impl Checkpoint {
             let what = "the meshes or images of the scene have other contents now";
             return Err(self.error(what, foreign));
         }
-        let mut state = RenderState::new(&compiled, options, None)
+        let mut options = options.clone();
+        // A render that has changed to double precision stays in it.
+        if options.world.precision == Precision::Auto {
+            let precision = Precision::from_name(&self.header.film.precision);
+            options.world.precision = precision.unwrap_or(Precision::Auto);
+        }
+        let mut state = RenderState::new(&compiled, &options, None)
             .map_err(|fault| self.error(fault, "correct the scene"))?;
         let (ours, theirs) = (&state.film.header, &self.header.film);
         if ours.precision != theirs.precision {

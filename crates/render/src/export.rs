@@ -2,11 +2,11 @@
 //! durations or numbers of threads, so that equal pictures have equal metadata.
 
 use crate::film::file::FilmFileHeader;
-use crate::film::{ByMeasure, Display, Tone};
+use crate::film::{ByMeasure, Display};
 use crate::render_state::RenderState;
 use crate::session::Report;
 use zerkalo_kernel::sampling::SamplerKind;
-use zerkalo_scene::Scene;
+use zerkalo_scene::{Scene, Tone};
 use zerkalo_scene::value::Fnv1a64;
 
 /// Origin of a picture: the part of its metadata that is not in its [`RenderState`].
@@ -87,7 +87,7 @@ const SETTINGS: &str = "Settings";
 const DISPLAY: &str = ", exposure ";
 
 /// Returns the metadata entries about samples and noise.
-fn film_entries(report: &Report) -> [(&'static str, String); 5] {
+fn film_entries(report: &Report) -> [(&'static str, String); 6] {
     let spp = &report.spp;
     let noise = match report.noise {
         Some(n) => format!(
@@ -99,6 +99,7 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     [
         ("Samples per pixel", format!("{:.2} ({}-{})", spp.mean, spp.min, spp.max)),
         ("Noise", noise),
+        ("Error", report.error.as_ref().map_or("unknown".to_string(), |error| error.to_string())),
         ("Bad samples", report.bad_samples.to_string()),
         ("Saturated samples", report.saturated_samples.to_string()),
         ("Saturated pixels", report.saturated_pixels.to_string()),

@@ -7,6 +7,8 @@ pub mod film;
 pub mod image_file;
 
 mod checkpoint;
+mod error_parts;
+mod error_probe;
 pub mod export;
 mod file_error;
 mod first_hit_buffer;
@@ -24,6 +26,7 @@ mod threads;
 pub mod wave;
 
 pub use checkpoint::{Checkpoint, SampleInputs};
+pub use error_parts::{ErrorParts, ErrorTarget, ROUNDING_TO_8_BITS};
 pub use file_error::FileError;
 pub use first_hit_buffer::FirstHitBuffer;
 pub use region_render::RegionRender;

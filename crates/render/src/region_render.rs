@@ -154,6 +154,9 @@ impl RegionRender {
         }
         if rows.end == height {
             self.report.noise = Noise::of_tiles(self.estimates.iter().copied());
+            if let (Some(error), Some(noise)) = (&mut self.report.error, self.report.noise) {
+                error.noise = noise.rmse.levels;
+            }
             self.report.state = State::Finished(self.stopped_by);
         }
         Ok(())
@@ -187,6 +190,7 @@ impl RegionRender {
             rays: finished.rays + schedule.rays,
             seconds,
             noise: schedule.noise,
+            error: schedule.error_parts(&state.world.info().left_out),
             eta_seconds: share.filter(|_| done > 0.0).map(|_| Interval::exact(left)),
             progress: Some(done),
             bad_samples: finished.bad_samples + film.bad_samples(),

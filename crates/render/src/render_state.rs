@@ -1,9 +1,10 @@
 //! State of one progressive render: compiled scene, film and noise estimator.
 
+use crate::error_probe::ErrorProbe;
 use crate::film::{Display, Estimator, Film, Header, LightWeights};
 use crate::pass::PassContext;
 use crate::relighting::Relighting;
-use crate::schedule::{Schedule, Settings};
+use crate::schedule::{Measurable, Schedule, Settings};
 use crate::wave::{Wave, WaveReport};
 use crate::{first_pass, memory_budget, pass};
 use std::ops::Range;
@@ -41,6 +42,10 @@ pub struct RenderState {
     sampling: SampleSettings,
     display: Display,
     estimator: Estimator,
+    /// Scene compiled for the error probe; `None` before the first.
+    pub(super) probe: Option<Box<ErrorProbe>>,
+    /// Value of [`world::Options::merge_lights`].
+    pub(super) merge_lights: bool,
 }
 
 impl RenderState {
@@ -109,6 +114,8 @@ impl RenderState {
             sampling: options.sampling,
             display: options.display,
             estimator,
+            probe: None,
+            merge_lights: options.world.merge_lights,
         })
     }
 
@@ -158,7 +165,27 @@ impl RenderState {
         let pixels: Vec<u32> = pixels.collect();
         let mut schedule = Schedule::new(&pixels, settings);
         schedule.light_period = self.world.info().light_period;
+        schedule.measurable = self.measurable();
         schedule
+    }
+
+    /// Returns the parts of the error that probes measure.
+    pub(super) fn measurable(&self) -> Measurable {
+        let info = self.world.info();
+        Measurable {
+            rounding: matches!(self.world, AnyWorld::Single(_)),
+            cut_paths: !info.biases.is_empty(),
+            primitives: info.primitives,
+        }
+    }
+
+    /// Returns the seconds of error probes, and of compiling the scene for them.
+    pub(super) fn probe_seconds(&self) -> [f64; 2] {
+        self.probe.as_ref().map_or([0.0; 2], |probe| [probe.seconds, probe.compile_seconds])
+    }
+
+    pub(super) fn sampling(&self) -> &SampleSettings {
+        &self.sampling
     }
 
     /// Traces the jobs of the first pass, as `first_pass::run` does. The film of a cancelled pass

@@ -2,7 +2,7 @@
 //! not depend on the moments at which a session would publish snapshots.
 
 use crate::schedule::{Schedule, Settings, Step, StoppedBy};
-use crate::{Options, RenderState, threads};
+use crate::{ErrorParts, Options, RenderState, threads};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -47,10 +47,20 @@ impl SyncRender {
             let report = self.state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
             self.seconds += start.elapsed().as_secs_f64();
             self.schedule.complete(&wave, &report);
+            if let Some(packets) = self.schedule.due_probe() {
+                let never = AtomicBool::new(false);
+                let sums = self.state.probe_errors(packets, &self.pool, &never);
+                sums.iter().for_each(|sums| self.schedule.record_probe(sums));
+            }
             if wave.replicate == 1 {
                 return None;
             }
         }
+    }
+
+    /// Returns the parts of the error. Returns `None` before the first estimate of the noise.
+    pub fn error_parts(&self) -> Option<ErrorParts> {
+        self.schedule.error_parts(&self.state.world.info().left_out)
     }
 
     /// Returns the estimated RMSE in 8-bit levels. Returns `None` before the first estimate.

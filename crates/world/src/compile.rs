@@ -3,7 +3,7 @@
 
 use crate::analysis::inventory::inventory;
 use crate::analysis::radiance_range::SceneDistances;
-use crate::analysis::truncation_bias::truncation_bounds;
+use crate::analysis::truncation_bias::{left_out, truncation_bounds};
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::culling::tile::{Culling, CullingMode, FrustumCuller, LightBounds, TileCandidates};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
@@ -497,6 +497,8 @@ impl<L: SimdFloat> World<L> {
                 light_period: lights.choice.as_ref().map_or(1, |choice| choice.sets as u32),
                 inventory: String::new(),
                 biases: truncation_bounds(scene),
+                left_out: left_out(scene),
+                primitives: recentered.forms.iter().map(|f| f.triangles().max(1) as u64).sum(),
             },
             lights,
             culling,

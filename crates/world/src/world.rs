@@ -10,6 +10,7 @@ use crate::lights::on_surfaces::OnSurface;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::primitive::Aggregate;
 use zerkalo_kernel::sampling::CameraDimensions;
+use zerkalo_scene::IntegratorSettings;
 use zerkalo_scene::camera::PerspectiveCamera;
 use zerkalo_scene::light::{DeltaLight, EnvironmentLight};
 use zerkalo_scene::material::Bsdf;
@@ -119,12 +120,28 @@ pub struct WorldInfo {
     /// One sentence for each setting of the scene that ends paths early, such as `max_depth`. Each
     /// sentence gives an upper bound of the light that is lost.
     pub biases: Vec<String>,
+    /// Light that the settings of the scene leave out, such as `no bounces`.
+    pub left_out: Vec<&'static str>,
+    /// Number of primitives, with each triangle of a mesh.
+    pub primitives: u64,
 }
 
 impl<L: SimdFloat> World<L> {
     /// Returns which random positions camera rays use: in the pixel, on the lens, both or none.
     pub fn camera_dimensions(&self) -> CameraDimensions {
         CameraDimensions { pixel: self.jitter, lens: self.camera.lens.is_some() }
+    }
+
+    /// Lets paths be longer than `trace`, the settings of the scene, permits: twice as long for each
+    /// of `doublings`. Reflections and bounces that these settings switch off stay off.
+    pub fn lengthen_paths(&mut self, trace: &IntegratorSettings, doublings: u32) {
+        if self.depth > 0 {
+            self.depth = trace.max_depth << doublings;
+        }
+        if let Some(limits) = &mut self.diffuse_limits {
+            limits.depth = trace.max_diffuse_depth << doublings;
+        }
+        self.min_throughput = trace.min_throughput * 0.0625f64.powi(doublings as i32);
     }
 
     /// Returns `true` if all samples of a tile with these candidates are black.

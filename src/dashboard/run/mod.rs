@@ -213,4 +213,4 @@ const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
 
 /// Initial stop criterion: a noise of half a level.
 const DEFAULT_STOP: Stop =
-    Stop { spp: None, noise_levels: Some(0.5), rmse_linear: None, seconds: None };
+    Stop { spp: None, noise_levels: Some(0.5), rmse_linear: None, error: None, seconds: None };

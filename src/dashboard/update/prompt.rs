@@ -6,6 +6,7 @@ use crate::dashboard::{Answer, Editor, Effect, Format, Overlay, Prompt, UpdateCo
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
+use zerkalo_render::{ErrorTarget, ROUNDING_TO_8_BITS};
 use zerkalo_scene::edit::{self, SceneSettings, Target};
 use zerkalo_scene::value::{number, truncated};
 
@@ -216,6 +217,7 @@ pub(super) fn stop_text(stop: &Stop) -> String {
     let targets = [
         ("noise", stop.noise_levels),
         ("rmse", stop.rmse_linear),
+        ("error", stop.error.map(|error| error.levels)),
         ("spp", stop.spp.map(f64::from)),
         ("time", stop.seconds),
     ];
@@ -245,6 +247,10 @@ fn parse_stop(text: &str) -> Result<Stop, String> {
         match word.to_ascii_lowercase().as_str() {
             "noise" => stop.noise_levels = Some(number()?),
             "rmse" => stop.rmse_linear = Some(number()?),
+            "error" => {
+                let quantization = ROUNDING_TO_8_BITS;
+                stop.error = Some(ErrorTarget { levels: number()?, quantization });
+            }
             "time" => stop.seconds = Some(number()?),
             "spp" => {
                 let whole = value.parse().ok().filter(|n: &u32| *n > 0);
@@ -253,7 +259,9 @@ fn parse_stop(text: &str) -> Result<Stop, String> {
             }
             _ => {
                 let word = truncated(word);
-                return Err(format!("\"{word}\" is not known: noise, rmse, spp, time or none."));
+                return Err(format!(
+                    "\"{word}\" is not known: noise, rmse, error, spp, time or none."
+                ));
             }
         }
     }
@@ -280,12 +288,13 @@ mod tests {
             spp: Some(1000),
             noise_levels: Some(0.5),
             rmse_linear: Some(0.001),
+            error: Some(ErrorTarget { levels: 0.6, quantization: ROUNDING_TO_8_BITS }),
             seconds: Some(60.0),
         };
         for stop in [all, Stop::default(), Stop { seconds: Some(1.5), ..Stop::default() }] {
             assert_eq!(parse_stop(&stop_text(&stop)), Ok(stop));
         }
-        assert_eq!(parse_stop("NOISE=0.5, spp 1000 rmse 0.001,time 60"), Ok(all));
+        assert_eq!(parse_stop("NOISE=0.5, spp 1000 rmse 0.001,time 60 error .6"), Ok(all));
         for wrong in
             ["", "noise", "noise -1", "spp 0", "spp 1.5", "time nan", "0.5", "x 1", "time inf"]
         {

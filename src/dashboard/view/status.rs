@@ -90,6 +90,12 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     if let Some(noise) = report.noise {
         parts.push(part(2, noise_part(model, report, noise.rmse.levels, theme)));
     }
+    if let Some(error) = report.error.as_ref().filter(|_| !watching) {
+        let total = error.total();
+        let total = if total.is_finite() { number(total) } else { "without bound".to_string() };
+        parts.push(part(4, vec![dim("error "), plain(total)]));
+        parts.push(part(8, vec![dim(&error.others())]));
+    }
     match model.stop.seconds {
         _ if watching => {}
         Some(limit) => {
@@ -129,7 +135,9 @@ fn state(model: &Model, report: &Report, theme: &Theme) -> (String, Style) {
         State::Paused => ("‖ paused", theme.warn()),
         State::Tracing if model.paused => ("‖ paused", theme.warn()),
         State::Tracing => ("● tracing", theme.accent()),
-        State::Finished(StoppedBy::Noise | StoppedBy::Rmse) => ("✓ converged", theme.good()),
+        State::Finished(StoppedBy::Noise | StoppedBy::Rmse | StoppedBy::Error) => {
+            ("✓ converged", theme.good())
+        }
         State::Finished(StoppedBy::Spp) => ("✓ samples reached", theme.good()),
         State::Finished(StoppedBy::Time) => ("✓ time over", theme.good()),
         State::Finished(StoppedBy::RaysPerPixel) => ("✓ rays per pixel reached", theme.good()),

@@ -77,7 +77,7 @@ impl Sums<'_> {
 
 impl Tile {
     #[inline(always)]
-    pub(super) fn sums(&self, pixel: usize) -> Sums<'_> {
+    pub(crate) fn sums(&self, pixel: usize) -> Sums<'_> {
         let values = [self.pixel(0, pixel), self.pixel(1, pixel)];
         Sums { values, counts: self.counts_of(pixel) }
     }

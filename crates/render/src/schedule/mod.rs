@@ -13,6 +13,7 @@
 mod allocation;
 mod convergence_fit;
 mod prediction;
+mod probing;
 mod settings;
 mod state;
 mod stop;
@@ -20,11 +21,13 @@ mod stop;
 mod tests;
 mod tile;
 
+use crate::error_probe::ProbeSums;
 use crate::film::{Noise, TileNoise};
 use crate::wave::{Job, JobReport, Wave};
 use convergence_fit::ConvergenceFit;
 pub use convergence_fit::Interval;
 pub use prediction::{PlannedTile, Prediction, USUAL_SLOPE};
+pub use probing::Measurable;
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{FLATTEST, Tile, clamp_slope};
 
@@ -96,6 +99,12 @@ pub struct Schedule {
     /// The error falls steeply at this number of samples. Estimates from fewer samples do not
     /// predict the fall. They are discarded once a tile has an estimate from at least this number.
     pub light_period: u32,
+    /// Parts of the error that probes measure.
+    pub measurable: Measurable,
+    /// Results of all probes so far.
+    probe: ProbeSums,
+    /// Number of samples at the latest probe.
+    probed_at: u64,
 }
 
 impl Schedule {
@@ -171,6 +180,7 @@ impl Schedule {
     pub fn forget_estimates(&mut self) {
         self.tiles.iter_mut().for_each(Tile::forget_estimates);
         self.noise = None;
+        (self.probe, self.probed_at) = Default::default();
         self.convergence = ConvergenceFit::default();
     }
 

@@ -1,5 +1,6 @@
 //! Settings of the schedule: error measure, stop criteria, cap.
 
+use crate::error_parts::ErrorTarget;
 use crate::film::ByMeasure;
 
 /// Error that adaptive sampling minimises.
@@ -31,6 +32,8 @@ pub struct Stop {
     pub noise_levels: Option<f64>,
     /// Estimated RMSE of the picture in linear radiance.
     pub rmse_linear: Option<f64>,
+    /// Error of the displayed picture with all its parts.
+    pub error: Option<ErrorTarget>,
     /// Time limit in seconds, tested between waves.
     pub seconds: Option<f64>,
 }
@@ -41,6 +44,9 @@ pub enum StoppedBy {
     Spp,
     Noise,
     Rmse,
+    /// The error meets its target, or the noise is as small as the target requires, while another
+    /// part of the error exceeds it.
+    Error,
     Time,
     /// Tiles have reached their cap ([`Settings::rays_per_pixel`]), and the other tiles, if there
     /// are any, meet the error target.
@@ -56,6 +62,7 @@ impl StoppedBy {
             Self::Spp => "spp",
             Self::Noise => "noise",
             Self::Rmse => "rmse",
+            Self::Error => "error",
             Self::Time => "time",
             Self::RaysPerPixel => "rays_per_pixel",
             Self::Full => "full",

@@ -7,9 +7,11 @@
 //!   latest estimate in a uniform round (u32);
 //! - 1 if the current round ends with an estimate, otherwise 0 (u8), and the current replicate
 //!   (u8);
-//! - the noise of the picture, and the points of the convergence fit;
+//! - the noise of the picture, the sums of the error probes with the number of samples at the
+//!   latest one, and the points of the convergence fit;
 //! - the jobs of the current round, its jobs that remain to be traced, and the tiles.
 
+use crate::error_probe::{PairedDifference, ProbeSums};
 use crate::film::file::Fields;
 use crate::film::{ByMeasure, Noise, TileNoise};
 use crate::schedule::tile::Tile;
@@ -31,6 +33,8 @@ impl Schedule {
             floats(&[noise.p95_levels], &mut out);
             by_measure(noise.effective_pixels, &mut out);
         }
+        encode_probe(&self.probe, &mut out);
+        out.extend(self.probed_at.to_le_bytes());
         length(self.convergence.points.len(), &mut out);
         self.convergence.points.iter().for_each(|(rays, noise)| floats(&[*rays, *noise], &mut out));
         for jobs in [&self.round, &self.remaining] {
@@ -70,6 +74,7 @@ impl Schedule {
                 effective_pixels: decode_by_measure(&mut fields)?,
             });
         }
+        (self.probe, self.probed_at) = (decode_probe(&mut fields)?, fields.u64()?);
         let points = fields.u32()?;
         let point = |_| Some((error(&mut fields)?, error(&mut fields)?));
         self.convergence.points = (0..points).map(point).collect::<Option<_>>()?;
@@ -129,6 +134,37 @@ fn decode_estimate(pixels: u32, fields: &mut Fields) -> Option<TileNoise> {
     let [reported, allocation, squares] =
         [decode_by_measure(fields)?, decode_by_measure(fields)?, decode_by_measure(fields)?];
     Some(TileNoise { reported, allocation, squares, pixels, samples })
+}
+
+fn encode_probe(sums: &ProbeSums, out: &mut Vec<u8>) {
+    out.extend(sums.packets.to_le_bytes());
+    out.extend(sums.pixels.to_le_bytes());
+    out.extend(sums.cost.to_le_bytes());
+    for PairedDifference { product, product_squares, variance, mean } in [sums.rounding, sums.cut] {
+        floats(&[product, product_squares, variance, mean], out);
+    }
+    floats(&sums.doublings, out);
+}
+
+fn decode_probe(fields: &mut Fields) -> Option<ProbeSums> {
+    let (packets, pixels, cost) = (fields.u32()?, fields.u32()?, fields.u64()?);
+    let mut difference = || {
+        Some(PairedDifference {
+            product: fields.f64()?,
+            product_squares: fields.f64()?,
+            variance: fields.f64()?,
+            mean: fields.f64()?,
+        })
+    };
+    let (rounding, cut) = (difference()?, difference()?);
+    Some(ProbeSums {
+        packets,
+        pixels,
+        cost,
+        rounding,
+        cut,
+        doublings: [fields.f64()?, fields.f64()?],
+    })
 }
 
 fn length(length: usize, out: &mut Vec<u8>) {

@@ -60,7 +60,9 @@ impl Schedule {
     /// Returns the error target with its measure. If both measures have targets, returns the one
     /// that adaptive sampling minimises.
     pub(super) fn target(&self) -> Option<(Criterion, f64)> {
-        let levels = self.settings.stop.noise_levels.map(|t| (Criterion::Levels, t));
+        let stop = &self.settings.stop;
+        let levels = stop.noise_levels.or_else(|| stop.error.map(|e| self.noise_target(e)));
+        let levels = levels.map(|t| (Criterion::Levels, t));
         let linear = self.settings.stop.rmse_linear.map(|t| (Criterion::Linear, t));
         match self.settings.criterion {
             Criterion::Levels => levels.or(linear),
@@ -77,6 +79,10 @@ impl Schedule {
             }
             if stop.rmse_linear.is_some_and(|t| noise.rmse.linear <= t) {
                 return Some(StoppedBy::Rmse);
+            }
+            let is_met = |error| noise.rmse.levels <= self.noise_target(error);
+            if self.is_probed() && stop.error.is_some_and(is_met) {
+                return Some(StoppedBy::Error);
             }
             if self.capped_at_target() {
                 return Some(StoppedBy::RaysPerPixel);

@@ -14,6 +14,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use zerkalo_scene::Scene;
+use zerkalo_world::{self as world, Precision};
 
 /// Target durations in seconds of a piece of a wave: while the client requests a picture or a
 /// pixel, and while it requests neither.
@@ -76,6 +77,8 @@ pub(super) struct ActiveRender {
     inventory: Arc<str>,
     cache: ViewCache,
     first_hits: Option<Arc<FirstHitBuffer>>,
+    /// Error of rounding because of which this render is in double precision.
+    rounding_avoided: Option<f64>,
     /// Seconds per ray that the latest first-hit buffer took.
     first_hit_ray_seconds: f64,
 }
@@ -93,6 +96,7 @@ impl ActiveRender {
             inventory: Arc::from(&*state.world.info().inventory),
             cache: ViewCache::default(),
             first_hits: None,
+            rounding_avoided: None,
             first_hit_ray_seconds: FIRST_HIT_RAY_SECONDS,
             state,
         }
@@ -200,6 +204,7 @@ impl ActiveRender {
             let start = Instant::now();
             let report = self.state.trace_wave(&wave, &context.pool, &flags.cancel_wave);
             self.complete(&wave, &report, start.elapsed());
+            self.probe_errors(context);
             return;
         }
         self.update_first_hits(context, FIRST_HITS_SECONDS);
@@ -232,6 +237,30 @@ impl ActiveRender {
                 self.state.film.restart();
             }
         }
+    }
+
+    /// Probes the errors of rounding and of cut paths, if a probe is due.
+    fn probe_errors(&mut self, context: &WorkContext) {
+        let Some(packets) = self.schedule.due_probe() else { return };
+        let cancel = &context.shared.cancel_wave;
+        if let Some(sums) = self.state.probe_errors(packets, &context.pool, cancel) {
+            self.schedule.record_probe(&sums);
+        }
+    }
+
+    /// Starts the render again in double precision, if `options` leave the choice of precision to
+    /// the program and the error of rounding is too large. Fails if there is not enough memory.
+    pub fn avoid_rounding(self, options: &Options) -> Result<Self, String> {
+        let rounding = self.schedule.excessive_rounding();
+        if options.world.precision != Precision::Auto || rounding.is_none() {
+            return Ok(self);
+        }
+        let double = world::Options { precision: Precision::Double, ..options.world.clone() };
+        let options = Options { world: double, ..options.clone() };
+        let (scene, settings) = (Arc::clone(self.state.scene()), self.schedule.settings);
+        let traced_for = self.traced_for;
+        let started = Self::start(&scene, &options, settings, Some(self))?;
+        Ok(Self { rounding_avoided: rounding, traced_for, ..started })
     }
 
     /// Cuts `wave` to a piece of about [`PIECE_SECONDS`], with jobs of about [`JOB_SECONDS`].
@@ -308,6 +337,9 @@ impl ActiveRender {
             compile_seconds: self.compiled_in.as_secs_f64(),
             first_picture_seconds: self.first_picture_after.map(|time| time.as_secs_f64()),
             noise: self.schedule.noise,
+            error: self.schedule.error_parts(&self.state.world.info().left_out),
+            probe_seconds: self.state.probe_seconds(),
+            rounding_avoided: self.rounding_avoided,
             eta_seconds: self.schedule.eta_seconds(seconds),
             quality_seconds: QUALITIES
                 .map(|levels| self.schedule.seconds_to_noise(levels, seconds)),

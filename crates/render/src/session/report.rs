@@ -1,5 +1,6 @@
 //! Progress report of a render session.
 
+use crate::error_parts::ErrorParts;
 use crate::film::{Display, Film, LightWeights, Noise};
 use crate::schedule::{Interval, Spp, StoppedBy};
 use std::sync::Arc;
@@ -35,6 +36,13 @@ pub struct Report {
     /// Seconds from the start of the compilation to the first complete picture.
     pub first_picture_seconds: Option<f64>,
     pub noise: Option<Noise>,
+    /// Parts of the error, with the noise. `None` before the first estimate of the noise, and for
+    /// films.
+    pub error: Option<ErrorParts>,
+    /// Seconds of error probes, and of compiling the scene for them.
+    pub probe_seconds: [f64; 2],
+    /// Error of rounding in single precision for which the render has changed to double precision.
+    pub rounding_avoided: Option<f64>,
     /// Estimated seconds left until the render ends.
     pub eta_seconds: Option<Interval>,
     /// Estimated seconds left until each of the [`QUALITIES`] is reached, whatever the stop criteria
@@ -93,7 +101,9 @@ impl Report {
             (self.saturated_pixels, "saturated pixel", ""),
         ];
         let warning = |(n, one, end)| format!("{n} {one}{}{end}", if n == 1 { "" } else { "s" });
-        counts.into_iter().filter(|(n, ..)| *n > 0).map(warning).collect()
+        let avoided = self.rounding_avoided.iter();
+        let avoided = avoided.map(|levels| format!("double: rounding {levels:.2} in single"));
+        counts.into_iter().filter(|(n, ..)| *n > 0).map(warning).chain(avoided).collect()
     }
 
     /// Returns the mean number of samples traced per second since the start of the render.

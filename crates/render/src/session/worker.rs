@@ -65,6 +65,7 @@ impl Worker {
             if std::mem::take(&mut self.pending) {
                 self.start_newest();
             }
+            self.avoid_rounding();
             self.run_tasks();
             self.advance();
         }
@@ -160,6 +161,14 @@ impl Worker {
         self.context.shared.compilations.fetch_add(1, Ordering::SeqCst);
         let previous = std::mem::replace(&mut self.work, Ok(None)).ok().flatten();
         self.work = ActiveRender::start(scene, &self.options, self.settings, previous).map(Some);
+    }
+
+    /// Changes to double precision if the first error probe asks for it.
+    fn avoid_rounding(&mut self) {
+        if self.work().is_some_and(|work| work.schedule.excessive_rounding().is_some()) {
+            let work = std::mem::replace(&mut self.work, Ok(None)).ok().flatten();
+            self.work = work.map(|work| work.avoid_rounding(&self.options)).transpose();
+        }
     }
 
     /// Runs the waiting tasks, unless the render has no picture yet.

@@ -229,6 +229,27 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     out
 }
 
+/// Returns the names of the light that the settings of `scene` leave out, although its surfaces
+/// reflect or transmit it.
+pub fn left_out(scene: &Scene) -> Vec<&'static str> {
+    let trace = &scene.trace;
+    let specular = Reach::new(scene, false).first > 0.0;
+    let is_diffuse = |object: &Object| {
+        let materials = object.materials().into_iter().filter_map(|name| scene.materials.get(name));
+        materials.into_iter().any(|material| max_diffuse_albedo(material, object) > 0.0)
+    };
+    let diffuse = scene.objects.iter().any(is_diffuse);
+    let full = trace.ray_types == RayTypes::Full;
+    let bounces = full && trace.max_diffuse_depth > 0;
+    let names = [
+        (trace.ray_types == RayTypes::Primary, "no shadows"),
+        (specular && (!full || trace.max_depth == 0), "no reflections"),
+        (diffuse && !bounces, "no bounces"),
+        (diffuse && specular && !(bounces && trace.caustics), "no caustics"),
+    ];
+    names.into_iter().filter(|(missing, _)| *missing).map(|(_, name)| name).collect()
+}
+
 /// Returns the largest diffuse albedo of a scene in which the emission of some object is found only
 /// by rays that hit it; `None` in other scenes, and if the albedo is 0.
 fn albedo_under_unsampled_emission(scene: &Scene) -> Option<f64> {

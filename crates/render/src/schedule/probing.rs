@@ -1,0 +1,112 @@
+//! Error probes: when they are due, and the parts of the error to which their results lead.
+
+use crate::error_parts::{ErrorParts, ErrorTarget, ROUNDING_TO_8_BITS};
+use crate::error_probe::ProbeSums;
+use crate::schedule::{SAMPLE_ALIGNMENT, Schedule};
+use std::ops::Range;
+
+/// Share of the rays of a render that probes may cost.
+const SHARE: u64 = 128;
+/// Number of rays per primitive after which the scene is compiled in double precision. Compiling a
+/// primitive takes about as long as four rays.
+const RAYS_PER_PRIMITIVE: u64 = 256;
+/// Largest number of packets of one probe.
+const MAX_PACKETS: u64 = 1024;
+/// Number of packets after which the parts of the error decide about the end of a render.
+const MIN_PACKETS: u32 = 16;
+/// Samples of a packet: those of 16 pixels in both replicates.
+const PACKET_SAMPLES: u64 = 32;
+/// Largest error of rounding with which `auto` stays in single precision, as a share of the target.
+const ROUNDING_SHARE: f64 = 0.1;
+
+/// Parts of a picture's error that a probe can measure.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measurable {
+    /// `true` if the picture is traced in single precision.
+    pub rounding: bool,
+    /// `true` if limits of the scene cut paths.
+    pub cut_paths: bool,
+    /// Number of primitives, with each triangle of a mesh.
+    pub primitives: u64,
+}
+
+impl Schedule {
+    /// Returns the packets of the next probe; `None` if none is due. Probes follow noise estimates,
+    /// and the number of samples doubles from one to the next.
+    pub fn due_probe(&self) -> Option<Range<u32>> {
+        let Measurable { rounding, cut_paths, primitives } = self.measurable;
+        let is_between_rounds = self.remaining.is_empty() && self.replicate == 1;
+        let due = self.noise.is_some()
+            && is_between_rounds
+            && (rounding || cut_paths)
+            && self.samples / 2 >= self.probed_at;
+        if !due {
+            return None;
+        }
+        let done = &self.probe;
+        let cost_of_packet = match done.packets {
+            // Paths of three lengths in double precision, and once more in single precision.
+            0 => 7 * PACKET_SAMPLES * self.rays / self.samples.max(1),
+            packets => done.cost / u64::from(packets),
+        };
+        let affordable = (self.rays / SHARE).saturating_sub(done.cost) / cost_of_packet.max(1);
+        let least = u64::from(MIN_PACKETS.saturating_sub(done.packets));
+        let packets = match self.settings.stop.error {
+            Some(_) => affordable.max(least),
+            None if self.rays < RAYS_PER_PRIMITIVE * primitives => 0,
+            None => affordable,
+        };
+        let packets = packets.min(MAX_PACKETS).min(self.tiles.len() as u64 + least) as u32;
+        (packets > 0).then_some(done.packets..done.packets + packets)
+    }
+
+    /// Records the results of the probe that was due.
+    pub fn record_probe(&mut self, sums: &ProbeSums) {
+        self.probe.add(sums);
+        self.probed_at = self.samples;
+    }
+
+    /// Returns the parts of the picture's error. `left_out` names what the model leaves out.
+    /// Returns `None` before the first estimate of the noise.
+    pub fn error_parts(&self, left_out: &[&'static str]) -> Option<ErrorParts> {
+        let noise = self.noise?.rmse.levels;
+        let (rounding, cut_paths) = self.probed_parts();
+        let quantization = self.settings.stop.error.map_or(ROUNDING_TO_8_BITS, |e| e.quantization);
+        Some(ErrorParts { noise, rounding, cut_paths, quantization, left_out: left_out.to_vec() })
+    }
+
+    /// Returns the errors of rounding and of cut paths; `None` for a part that was not measured.
+    fn probed_parts(&self) -> (Option<f64>, Option<f64>) {
+        let Measurable { rounding, cut_paths, .. } = self.measurable;
+        let measured = self.probe.rounding(self.spp().mean);
+        let rounding = if rounding { measured } else { Some(0.0) };
+        (rounding, if cut_paths { self.probe.cut_paths() } else { Some(0.0) })
+    }
+
+    /// Returns the noise at which the error meets `target`; if the other parts alone exceed it, the
+    /// noise at which noise and quantisation would meet it.
+    pub(super) fn noise_target(&self, target: ErrorTarget) -> f64 {
+        let (rounding, cut_paths) = self.probed_parts();
+        let square = |x: f64| x * x;
+        let alone = square(target.levels) - square(target.quantization);
+        let rest = (target.levels - cut_paths.unwrap_or(0.0)).max(0.0);
+        let left = square(rest) - square(target.quantization) - square(rounding.unwrap_or(0.0));
+        if left > 0.0 { left } else { alone.max(0.0) }.sqrt()
+    }
+
+    /// Returns `true` if enough of the picture was probed for the error to end the render.
+    pub(super) fn is_probed(&self) -> bool {
+        let Measurable { rounding, cut_paths, .. } = self.measurable;
+        !(rounding || cut_paths) || self.probe.packets >= MIN_PACKETS
+    }
+
+    /// Returns the error of rounding if it is too large for the error target, so that `auto` should
+    /// choose double precision. Only the first probes decide, so that little work is lost.
+    pub fn excessive_rounding(&self) -> Option<f64> {
+        let target = self.settings.stop.error?.levels;
+        let rounding = self.probe.systematic_rounding()?;
+        let is_early = self.spp().max <= 2 * SAMPLE_ALIGNMENT;
+        (is_early && self.measurable.rounding && rounding > ROUNDING_SHARE * target)
+            .then_some(rounding)
+    }
+}
