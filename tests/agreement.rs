@@ -170,6 +170,24 @@ fn deliberate_errors_are_detected() {
     }
 }
 
+/// Checks a smooth icosahedron, most of whose points are far below its curved surface, on a floor.
+#[test]
+fn coarse_smooth_mesh_agrees_with_reference_tracer() {
+    let scene = parsed(
+        "film.size = [32, 24]
+         camera = { eye = [0.6, 1.2, 2.2], target = [0.0, 0.6, 0.0], view_angle.vertical = 26.0 }
+         [materials.shiny]\ndiffuse = 0.7\nspecular = 0.3
+         [[light]]\npoint.position = [-2.0, 1.0, 0.8]
+         [[light]]\nsphere = { center = [2.0, 1.5, -1.0], radius = 0.3 }\nintensity = 8.0
+         [[light]]\nenvironment = { zenith = [0.2, 0.3, 0.5] }\nintensity = 0.2
+         [[object]]\nshape.platform = { center = [0.0, 0.0, 0.0], size = [9.0, 9.0] }
+         [[object]]\nmaterial = \"shiny\"\nshape.mesh = { normals = \"smooth\" }
+         transform = [{ scale = [1.0, 0.8, 1.2] }, { rotate_z = 20.0 }, { translate = [0.0, 0.2, 0.0] }]
+         [[object]]\nshape.sphere = { center = [-0.8, 0.5, 0.3], radius = 0.2 }",
+    );
+    detected(&[Mutation::Unlifted], "icosahedron", &scene, SAMPLES, 4 * REFERENCE_SAMPLES);
+}
+
 /// Scene of a box that is open towards the eye, with a rough ball and a glass ball in it. An
 /// environment with a gradient lights the box.
 const OPEN_BOX: &str = "

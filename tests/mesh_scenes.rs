@@ -223,6 +223,44 @@ fn flat_normals_show_the_triangles() {
     assert!(smooth * 4.0 < flat, "{smooth} {flat}");
 }
 
+/// Checks that a smooth ball of few triangles has no black facets on the side that faces the light,
+/// under every kind of light, and that no light reaches the other side. The view is from +z, without
+/// perspective.
+#[test]
+fn smooth_ball_has_no_black_facets() {
+    let desk = Desk::new();
+    desk.put("ball.obj", &ball(6, 9));
+    desk.put("fine.obj", &ball(12, 17));
+    let lights = [
+        "directional = { direction = [-1.0, -0.37, -0.21] }",
+        "point = { position = [1000.0, 370.0, 210.0] }\nfalloff = \"none\"",
+        "directional = { direction = [-1.0, -0.37, -0.21], angle = 0.01 }",
+        "sphere = { center = [1000.0, 370.0, 210.0], radius = 0.5 }\nintensity = 4e6",
+    ];
+    let light = DVec3::new(1.0, 0.37, 0.21).normalize();
+    for (text, file) in lights.iter().flat_map(|l| [(l, "ball.obj"), (l, "fine.obj")]) {
+        let scene = desk.scene(&format!(
+            "film = {{ size = [96, 96], filter = \"point\" }}
+             camera = {{ eye = [0.0, 0.0, 1000.0], target = [0.0, 0.0, 0.0], view_angle.vertical = 0.1260507 }}
+             [[light]]\n{text}
+             [[object]]\nshape.mesh = {{ file = \"{file}\", normals = \"smooth\" }}"
+        ));
+        let pixels = picture(&rendered(&scene, 3, Precision::Auto, 2), Replicates::Both);
+        let (mut facing, mut black, mut leaks) = (0, 0, 0);
+        for (i, pixel) in pixels.iter().enumerate() {
+            let at = |n: usize| (n as f64 + 0.5) * 2.2 / 96.0 - 1.1;
+            let (x, y) = (at(i % 96), -at(i / 96));
+            if x * x + y * y < 0.81 {
+                let cos = DVec3::new(x, y, (1.0 - x * x - y * y).sqrt()).dot(light);
+                facing += u32::from(cos > 0.03);
+                black += u32::from(cos > 0.03 && pixel[0] < 1e-4);
+                leaks += u32::from(cos < -0.03 && pixel[0] > 0.0);
+            }
+        }
+        assert!(facing > 2000 && black == 0 && leaks == 0, "{text}, {file}: {black}, {leaks}");
+    }
+}
+
 #[test]
 fn invalid_file_name_is_rejected_and_valid_file_read_once() {
     let desk = Desk::new();

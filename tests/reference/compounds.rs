@@ -90,6 +90,22 @@ impl Leaf {
         Some(self.scene_from_own_normals * own)
     }
 
+    /// Returns the mean of the nearest points to `point` in front of the tangent planes at the
+    /// corners of triangle `i`. `viewer` is the geometric normal on the viewer's side.
+    pub fn lifted(&self, i: usize, point: DVec3, viewer: DVec3) -> DVec3 {
+        let own = self.own_from_scene.transform_point3(point);
+        let ends = self.mesh.as_ref().and_then(|mesh| mesh.ends(i, own));
+        let (Some(ends), Some(smooth)) = (ends, self.smooth(i, point)) else { return point };
+        let to_viewer = smooth.dot(viewer).signum();
+        let nearest = ends.map(|(share, corner, normal)| {
+            let normal = self.scene_normal(normal) * to_viewer;
+            let corner = self.scene_from_own().transform_point3(corner);
+            (point - normal * (point - corner).dot(normal).min(0.0)) * share
+        });
+        let lifted = nearest.into_iter().sum::<DVec3>();
+        if (lifted - point).dot(viewer) > 1e-9 { lifted } else { point }
+    }
+
     /// Returns the colour that the mesh file gives triangle `i`; white without colours in the file.
     pub fn color(&self, i: usize) -> DVec3 {
         self.mesh.as_ref().map_or(DVec3::ONE, |mesh| mesh.color(i))

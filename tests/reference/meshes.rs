@@ -146,6 +146,13 @@ impl Triangles {
         Some((0..3).map(|k| normals[k] * shares[k]).sum())
     }
 
+    /// Returns the three corners of triangle `i`: for each, the barycentric coordinate of a point,
+    /// the position, and the normal. Returns `None` for flat shading.
+    pub fn ends(&self, i: usize, point: DVec3) -> Option<[(f64, DVec3, DVec3); 3]> {
+        let (normals, shares) = (self.normals.get(i)?, self.shares(i, point));
+        Some([0, 1, 2].map(|k| (shares[k], self.corners[i][k], normals[k])))
+    }
+
     /// Returns the barycentric coordinates of a point in the plane of triangle `i`.
     fn shares(&self, i: usize, point: DVec3) -> [f64; 3] {
         let [a, b, c] = self.corners[i];

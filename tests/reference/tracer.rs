@@ -32,6 +32,8 @@ pub enum Mutation {
     NoBending,
     /// Texture coordinates u and v are exchanged.
     SidewaysTexture,
+    /// Shadow rays start on the triangles of smooth meshes.
+    Unlifted,
     /// Bump heights are negated.
     SunkenBumps,
     /// Diffuse bounces are distributed uniformly over the hemisphere.
@@ -96,6 +98,8 @@ pub struct Hit<'a> {
     pub normal: DVec3,
     /// Shading normal. It differs from the geometric normal on smooth meshes and with bump maps.
     pub seen: DVec3,
+    /// Point from which lights are seen, above the hit point on convex smooth meshes.
+    pub lifted: DVec3,
     /// Factor of the albedo: vertex colour times texture.
     pub tint: DVec3,
     pub material: &'a Material,
@@ -105,6 +109,14 @@ pub struct Hit<'a> {
     pub front: bool,
     /// `true` if the ray hits the back of a one-sided surface.
     pub bare: bool,
+}
+
+impl Hit<'_> {
+    /// Returns `true` if the triangle that is hit hides lights in the direction `towards` without a
+    /// shadow ray.
+    fn is_behind(&self, towards: DVec3) -> bool {
+        self.lifted == self.point && self.normal.dot(towards) <= 0.0
+    }
 }
 
 impl<'a> Tracer<'a> {
@@ -352,6 +364,10 @@ impl<'a> Tracer<'a> {
             point,
             normal,
             seen,
+            lifted: match self.mutation {
+                Mutation::Unlifted => point,
+                _ => leaf.lifted(facet, point, normal),
+            },
             tint: leaf.color(facet) * self.painted(material, &spot),
             material,
             body: i,
@@ -448,9 +464,9 @@ impl<'a> Tracer<'a> {
                     let towards = numbers.direction();
                     (towards, f64::INFINITY, sky(light, towards) * (4.0 * PI))
                 }
-                None => arrival(light, hit.point, self.mutation),
+                None => arrival(light, hit.lifted, self.mutation),
                 Some(lamp) => {
-                    let Some(sample) = lamp.sample(hit.point, self.mutation, numbers) else {
+                    let Some(sample) = lamp.sample(hit.lifted, self.mutation, numbers) else {
                         continue;
                     };
                     let radiance = light.intensity * lamp.radiance(light.unit);
@@ -459,8 +475,8 @@ impl<'a> Tracer<'a> {
                 }
             };
             let mut cos = hit.seen.dot(towards);
-            let behind = cos <= 0.0 || hit.normal.dot(towards) <= 0.0;
-            let passed = if behind { 0.0 } else { self.passed(hit.point, towards, distance) };
+            let behind = cos <= 0.0 || hit.is_behind(towards);
+            let passed = if behind { 0.0 } else { self.passed(hit.lifted, towards, distance) };
             if passed == 0.0 {
                 continue;
             }
@@ -478,16 +494,16 @@ impl<'a> Tracer<'a> {
                 continue;
             }
             let (point, normal, area) = shine.point(numbers);
-            let distance = point.distance(hit.point);
-            let towards = (point - hit.point) / distance;
+            let distance = point.distance(hit.lifted);
+            let towards = (point - hit.lifted) / distance;
             let mut cos_there = -normal.dot(towards);
             if material.two_sided {
                 cos_there = cos_there.abs();
             }
             let cos = hit.seen.dot(towards);
-            let behind = cos <= 0.0 || hit.normal.dot(towards) <= 0.0 || cos_there <= 0.0;
+            let behind = cos <= 0.0 || hit.is_behind(towards) || cos_there <= 0.0;
             let end = distance * (1.0 - 1e-9);
-            let passed = if behind { 0.0 } else { self.passed(hit.point, towards, end) };
+            let passed = if behind { 0.0 } else { self.passed(hit.lifted, towards, end) };
             if passed == 0.0 {
                 continue;
             }

@@ -111,6 +111,8 @@ and every key with a default may be left out. Unknown keys are errors.
   of vertices, skins and instances, extensions of glTF that change neither shape nor colour, triangles without
   area, normals and texture coordinates that are no numbers. Of a polygon any shape in a plane is filled, also
   with cuts to holes.
+- Where a mesh is smooth and convex, shadow rays start above its triangles, on the curved surface that its normals
+  show; the shadows of coarse meshes have an error of that height ([decisions/bvh.md](decisions/bvh.md)).
 - An environment light is infinitely far away in all directions. It adds to the background, lights diffuse
   surfaces, makes highlights, and is seen by the camera and in mirrors unless `visible = false`. Its image
   is equirectangular: the top row is up (+y), the middle is towards -z, a quarter to the right of the middle

@@ -176,6 +176,12 @@ pub trait CanonicalShape {
     fn triangles(&self) -> usize {
         0
     }
+
+    /// Returns an upper bound of the lengths of all lifts, see
+    /// [`shading_normal`](crate::primitive::Aggregate::shading_normal).
+    fn max_lift(&self) -> f64 {
+        0.0
+    }
 }
 
 /// Returns the axis-parallel bounding box of `points`; `None` if there are none.

@@ -428,8 +428,11 @@ impl<'a> SceneDistances<'a> {
             // An object whose box is farther away than another object is not the nearest.
             let mut clearance = bounds.map_or(0.0, |bounds| box_distance(bounds, *center));
             if clearance <= nearest * (1.0 + 1e-9) {
-                clearance = self.forms[*object].clearance(*center).unwrap_or(0.0);
-                nearest = if clearance > min_clearance { nearest.min(clearance) } else { nearest };
+                let form = &self.forms[*object];
+                clearance = form.clearance(*center).unwrap_or(0.0);
+                if clearance > min_clearance {
+                    nearest = nearest.min(clearance - form.max_lift());
+                }
             }
             let far = bounds.map_or(clearance - radius, |bounds| distance_to_box(bounds, *center));
             farthest = farthest.max(far);

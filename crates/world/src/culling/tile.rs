@@ -112,6 +112,8 @@ const MAX_PAIRS: usize = 1 << 24;
 /// Culling by view frusta and by the space between visible surfaces and the lights.
 pub(crate) struct FrustumCuller {
     bounds: Vec<BoundingVolume>,
+    /// Largest distance between each primitive and the origins of shadow rays from its points.
+    lifts: Vec<f64>,
     /// `true` for each primitive that may occlude lights from points on its own surface: it is
     /// concave, or paths can be inside it.
     self_shadowing: Vec<bool>,
@@ -123,13 +125,13 @@ impl FrustumCuller {
     /// hit only from outside.
     pub fn new(forms: Vec<&Form>, outside_only: &[bool], lights: LightBounds) -> Self {
         let bound = |form: &Form| BoundingVolume::new(form).grown(lights.max_end_offset);
-        let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();
+        let bounds: Vec<BoundingVolume> = forms.iter().copied().map(bound).collect();
+        let lifts: Vec<f64> = forms.into_iter().map(|form| form.max_lift()).collect();
         // A shadow ray that leaves a flat primitive, or the outside of a convex one, cannot hit it
-        // again.
-        let self_shadowing =
-            |(b, outside_only): (&BoundingVolume, &bool)| !(*outside_only || b.is_flat());
-        let self_shadowing = bounds.iter().zip(outside_only).map(self_shadowing).collect();
-        Self { lights, self_shadowing, bounds }
+        // again unless it starts above it.
+        let self_shadowing = |i: usize| !(outside_only[i] || bounds[i].is_flat()) || lifts[i] > 0.0;
+        let self_shadowing = (0..bounds.len()).map(self_shadowing).collect();
+        Self { lights, self_shadowing, bounds, lifts }
     }
 
     /// Creates the light buffer of each light without a size, with the primitives in the BVH of
@@ -152,11 +154,11 @@ impl FrustumCuller {
         geometry: &Aggregate<L>,
         frustum: Option<&Frustum>,
     ) -> TileCandidates {
-        let visible_part = |bound: &BoundingVolume| match frustum {
-            Some(frustum) => bound.clip_to(frustum),
-            None => Some(bound.ball),
+        let visible_part = |(bound, lift): (&BoundingVolume, &f64)| {
+            let part = frustum.map_or(Some(bound.ball), |frustum| bound.clip_to(frustum))?;
+            Some(BoundingSphere { radius: part.radius + lift, ..part })
         };
-        let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
+        let parts: Vec<_> = self.bounds.iter().zip(&self.lifts).map(visible_part).collect();
         let primary = geometry.select(|primitive| parts[primitive as usize].is_some());
         let LightBounds { delta_lights, emitters, strata, .. } = &self.lights;
         let is_large = (delta_lights.len() + emitters.len()) * parts.len() > MAX_PAIRS;

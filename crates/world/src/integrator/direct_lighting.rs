@@ -64,9 +64,30 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let interaction = self.interaction;
         let mut facing = interaction.direct_mask & interaction.normal.dot(wi).gt(L::zero());
         if !SIMPLE && self.world.smooth {
-            facing = facing & interaction.geometric.dot(wi).gt(L::zero());
+            facing = facing & self.arrives(wi);
         }
         facing
+    }
+
+    /// Returns the lanes in which the surface does not face away from light from `wi`. Where shadow
+    /// rays start above the surface, they decide whether it occludes the light.
+    #[inline(always)]
+    pub fn arrives(&self, wi: Vec3<L>) -> L::Mask {
+        let faces = self.interaction.geometric.dot(wi).gt(L::zero());
+        match &self.interaction.lift {
+            Some(lift) => faces | lift.max_abs().gt(L::zero()),
+            None => faces,
+        }
+    }
+
+    /// Returns the origins of shadow rays.
+    #[inline(always)]
+    pub fn shadow_origin<const SIMPLE: bool>(&self) -> Vec3<L> {
+        let origin = self.interaction.ray_origin();
+        match &self.interaction.lift {
+            Some(lift) if !SIMPLE => origin + *lift,
+            Some(_) | None => origin,
+        }
     }
 
     /// Returns the diffuse part and, in `lanes`, the highlights for light from `wi`: the BSDF
@@ -108,7 +129,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         if interaction.direct_mask.none() {
             return;
         }
-        let origin = interaction.ray_origin();
+        let origin = self.shadow_origin::<SIMPLE>();
         let lights = world.lights.delta_lights.iter().zip(&self.candidates.occluders.delta_lights);
         for (index, (source, occluders)) in lights.enumerate() {
             let target = &source.light;
@@ -160,7 +181,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             return;
         }
         self.out.counts.glossy = true;
-        let origin = interaction.ray_origin();
+        let origin = self.shadow_origin::<SIMPLE>();
         let lights = choice.choose(self.sampler.light_choice_1d(self.bounce));
         for (stratum, occluders) in self.candidates.occluders.strata.iter().enumerate() {
             let to_light = lights.positions(stratum) - origin;

@@ -129,13 +129,13 @@ impl<L: SimdFloat> Vertex<'_, L> {
         if !world.lights.environments.is_empty() {
             self.environment_lighting(&glossy);
         }
-        let origin = interaction.ray_origin();
+        let origin = self.shadow_origin::<false>();
         for (index, occluders) in self.candidates.occluders.emitters.iter().enumerate() {
             let Some(source) = self.sample_emitter(index, origin) else { break };
             self.out.counts.glossy = true;
             let light = &source.light;
             let arrives = light.irradiance.x.gt(L::zero());
-            let arrives = arrives & interaction.geometric.dot(light.wi).gt(L::zero());
+            let arrives = arrives & self.arrives(light.wi);
             let rays = source.visible.then_some(&glossy);
             let value = self.reflected(light, arrives, rays, |_| L::one());
             let lit = value.max_element().gt(L::zero());
@@ -183,7 +183,11 @@ impl<L: SimdFloat> Vertex<'_, L> {
         }
         let Some(rays) = rays else { return value };
         let query = self.query();
-        for (index, lanes) in interaction.bsdfs(rays.lanes & arrives) {
+        let mut lanes = rays.lanes & arrives;
+        if interaction.lift.is_some() {
+            lanes = lanes & interaction.geometric.dot(light.wi).gt(L::zero());
+        }
+        for (index, lanes) in interaction.bsdfs(lanes) {
             let lobe = eval_lobe(world, interaction, &query, index, light.wi);
             let weight = power_heuristic(light.density, lobe.density) * rays.share;
             value += (lobe.value * weight).masked(lanes);

@@ -57,7 +57,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         for (index, environment) in self.world.lights.environments.iter().enumerate() {
             let source = self.sample_environment(index, interaction.direct_mask | glossy.lanes);
             let light = &source.light;
-            let arrives = interaction.geometric.dot(light.wi).gt(L::zero());
+            let arrives = self.arrives(light.wi);
             let rays = source.visible.then_some(glossy);
             let value =
                 self.reflected(light, arrives, rays, |pdf| power_heuristic(light.density, pdf));
@@ -89,7 +89,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let local = warp::cosine_hemisphere(u, v);
         let cos = local.z;
         let wi = Frame::around(interaction.normal).to_world(local).renormalize();
-        let faces = interaction.geometric.dot(wi).gt(L::zero()) & cos.gt(L::zero());
+        let faces = self.arrives(wi) & cos.gt(L::zero());
         let arrives = interaction.direct_mask & faces;
         let (radiance, pdf) = environment.light.radiance(wi, arrives);
         let density = cosine_pdf(cos);
@@ -112,7 +112,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         wi: Vec3<L>,
         value: Vec3<L>,
     ) {
-        let (geometry, origin) = (&self.world.geometry, self.interaction.ray_origin());
+        let (geometry, origin) = (&self.world.geometry, self.shadow_origin::<false>());
         let shadow = |vertex: &Self, lit| {
             let (ray, t_max) = (Ray { origin, direction: wi }, L::from_f64(L::MAX));
             let occluded = geometry.occluded(&ray, t_max, lit, geometry.all());

@@ -12,6 +12,10 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     /// Unit geometric normal, on the side from which the rays arrive. It differs from `normal` only
     /// on smooth meshes and bump-mapped surfaces.
     pub geometric: Vec3<L>,
+    /// Vector from the origins of secondary rays to those of shadow rays, see
+    /// [`Aggregate::shading_normal`](zerkalo_kernel::primitive::Aggregate::shading_normal). `None`
+    /// without smooth meshes, so that other scenes do not pay for it.
+    pub lift: Option<Vec3<L>>,
     pub point: Vec3<L>,
     /// Distance of the origins of secondary rays from the surface.
     pub offset: L,
@@ -93,6 +97,13 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         *self = Self {
             normal: Vec3::select(lanes, other.normal, self.normal),
             geometric: Vec3::select(lanes, other.geometric, self.geometric),
+            lift: match (self.lift, other.lift) {
+                (None, None) => None,
+                (own, other) => {
+                    let [own, other] = [own, other].map(|lift| lift.unwrap_or(Vec3::zero()));
+                    Some(Vec3::select(lanes, other, own))
+                }
+            },
             point: Vec3::select(lanes, other.point, self.point),
             offset: L::select(lanes, other.offset, self.offset),
             front: self.front | other.front,
@@ -163,12 +174,13 @@ fn interact_one<L: SimdFloat, const SIMPLE: bool>(
     let geometric = Vec3::select(front, surface.normal, -surface.normal);
     let index = world.bsdf_of[primitive as usize];
     let bsdf = &world.bsdfs[index as usize];
-    let mut normal = geometric;
+    let (mut normal, mut lift) = (geometric, None);
     // The points are built at each use, because a shared instance would be spilled to memory in
     // worlds without textures.
     let shading_points = || ShadingPoints { primitive, triangle: hit.triangle, surface, lanes };
     if !SIMPLE && world.smooth {
-        normal = shading_normal(world, &shading_points(), (front, geometric), ray.direction);
+        (normal, lift) =
+            shading_normal(world, &shading_points(), (front, geometric), ray.direction);
     }
     let mut factor = Vec3::of([1.0; 3]);
     let mut diffuse = Vec3::splat(bsdf.diffuse);
@@ -183,6 +195,7 @@ fn interact_one<L: SimdFloat, const SIMPLE: bool>(
     SurfaceInteraction {
         normal,
         geometric,
+        lift,
         albedo_factor: factor,
         point: surface.point,
         offset: surface.ray_offset(),

@@ -177,25 +177,26 @@ pub(crate) fn albedo_factor<L: SimdFloat>(
 
 /// Returns unit shading normals at the hit points of rays along `direction`: interpolated on smooth
 /// meshes, perturbed by bump maps, and bent so that they face the rays. The normals are on the side
-/// of `geometric`, the normal that faces the rays and points outwards in the lanes `front`.
+/// of `geometric`, the normal that faces the rays and points outwards in the lanes `front`. Also
+/// returns the lifts of the points, see [`Aggregate::shading_normal`].
 #[inline(never)]
 pub(crate) fn shading_normal<L: SimdFloat>(
     world: &World<L>,
     points: &ShadingPoints<L>,
     (front, geometric): (L::Mask, Vec3<L>),
     direction: Vec3<L>,
-) -> Vec3<L> {
+) -> (Vec3<L>, Option<Vec3<L>>) {
     let ShadingPoints { primitive, triangle, .. } = *points;
     let at = SurfacePoint { normal: geometric, ..points.surface };
-    let normal = world.geometry.shading_normal(primitive, triangle, &at, direction);
+    let (normal, lift) = world.geometry.shading_normal(primitive, triangle, &at, direction);
     let Some((mapping, bump)) =
         surface_texture(world, points.primitive).and_then(|texture| texture.bump.as_ref())
     else {
-        return normal;
+        return (normal, lift);
     };
     let coord = coordinates(&world.geometry, mapping, points);
     let (slope_u, slope_v) = bump.gradient((coord.u, coord.v), points.lanes.bits());
     let gradient = coord.grad_u * slope_u + coord.grad_v * slope_v;
     let outward = L::select(front, L::one(), -L::one());
-    keep_visible(mapping.bumped(normal, outward, gradient), geometric, direction)
+    (keep_visible(mapping.bumped(normal, outward, gradient), geometric, direction), lift)
 }

@@ -413,16 +413,23 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Returns the shading normal of `primitive` at the surface point `at`, whose normal is on the
-    /// viewer's side. `direction` is the direction of the rays. The result is less than 90 degrees
+    /// viewer's side. `direction` is the direction of the rays. The normal is less than 90 degrees
     /// away from the geometric normal and from the direction to the viewer.
+    ///
+    /// Also returns the lift: the vector from a point of a convex smooth mesh to the mean of its
+    /// projections onto the tangent planes of the vertices, by barycentric weights (Hanika 2021,
+    /// *Hacking the Shadow Terminator*). Shadow rays start there, so that the triangles around the
+    /// point do not occlude lights above the horizon of the shading normal. The lift is zero where
+    /// the mesh is concave or flat, and `None` for other primitives and meshes without smooth normals.
     pub fn shading_normal(
         &self,
         primitive: u32,
         triangle: L,
         at: &SurfacePoint<L>,
         direction: Vec3<L>,
-    ) -> Vec3<L> {
-        self.mesh(primitive).map_or(at.normal, |mesh| mesh.shading_normal(triangle, at, direction))
+    ) -> (Vec3<L>, Option<Vec3<L>>) {
+        let flat = (at.normal, None);
+        self.mesh(primitive).map_or(flat, |mesh| mesh.shading_normal(triangle, at, direction))
     }
 
     /// Returns the colour that the mesh file of `primitive` gives to `triangle`. Returns `None` if

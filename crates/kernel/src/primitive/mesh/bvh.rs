@@ -4,7 +4,7 @@
 use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
 use crate::primitive::canonical::Bounds;
 use crate::primitive::mesh::instance::EXTENT_PER_DETAIL;
-use crate::primitive::mesh::normals::creased;
+use crate::primitive::mesh::normals::{creased, tangent_depth};
 use crate::primitive::mesh::{CornerNormals, TriangleMesh};
 use glam::DVec3;
 use std::fmt;
@@ -33,6 +33,8 @@ pub struct Mesh {
     pub thin: bool,
     /// Largest ratio of length to height of the triangles that are not small in the mesh.
     pub aspect: f64,
+    /// Tangent depth of the normals in the file; 0 without any.
+    pub depth: f64,
     /// Computed normals by crease angle \[degrees\].
     creased: Mutex<Vec<(f64, Arc<CornerNormals>)>>,
 }
@@ -102,7 +104,10 @@ impl Mesh {
                 aspect = aspect.max(own);
             }
         }
-        Self { mesh, boxes, leaves, firsts, thin, aspect, creased: Mutex::default() }
+        let depth = mesh.normals.as_ref().map_or(0.0, |normals| {
+            tangent_depth(&mesh.positions, &mesh.triangles, normals, &mesh.triangles)
+        });
+        Self { mesh, boxes, leaves, firsts, thin, aspect, depth, creased: Mutex::default() }
     }
 
     /// Returns normals that are smooth except at creases above an angle, which the first call

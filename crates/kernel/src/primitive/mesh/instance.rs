@@ -22,6 +22,10 @@ pub(super) const EXTENT_PER_DETAIL: f64 = 64.0;
 /// Largest ratio of a triangle's length to its height for which single precision suffices.
 const MAX_SINGLE_ASPECT: f64 = 1e4;
 
+/// Square of the sine of an angle between a triangle and a tangent plane that is a rounding error of
+/// normals in single precision.
+const FLATTEST: f64 = 1e-12;
+
 /// Shading normals of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MeshNormals {
@@ -119,6 +123,15 @@ impl CanonicalShape for MeshForm {
 
     fn triangles(&self) -> usize {
         self.mesh.mesh.triangles.len()
+    }
+
+    fn max_lift(&self) -> f64 {
+        let depth = match self.normals {
+            MeshNormals::Flat => 0.0,
+            MeshNormals::OfVertices => self.mesh.depth,
+            MeshNormals::Creased(degrees) => self.mesh.creased_normals(degrees).depth,
+        };
+        depth * frobenius_norm(&self.scene_from_mesh.matrix3)
     }
 }
 
@@ -358,30 +371,48 @@ impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
 }
 
 impl<S: Float> MeshInstance<S> {
-    /// Returns the normal at `at`, interpolated and bent towards the viewer if the mesh is smooth.
+    /// Returns the shading normal and the lift at `at`; see
+    /// [`shading_normal`](crate::primitive::Aggregate::shading_normal).
     #[inline(never)]
     pub fn shading_normal<L: SimdFloat<Scalar = S>>(
         &self,
         triangle: L,
         at: &SurfacePoint<L>,
         direction: Vec3<L>,
-    ) -> Vec3<L> {
+    ) -> (Vec3<L>, Option<Vec3<L>>) {
+        let flat = (at.normal, None);
         if !self.smooth {
-            return at.normal;
+            return flat;
         }
-        let weights = self.triangle(triangle).weights(self.point(at.point));
+        let point = self.point(at.point);
+        let plane = self.triangle(triangle);
+        let weights = plane.weights(point);
         let (corners, normals) = match (&self.creased, &self.mesh.mesh.normals) {
             (Some(creased), _) => (&creased.corners, &creased.normals),
             (None, Some(normals)) => (&self.mesh.mesh.triangles, normals),
-            (None, None) => return at.normal,
+            (None, None) => return flat,
         };
         let normals = self.attribute(triangle, corners, normals);
-        let [a, b, c] = normals.map(|[x, y, z]| Vec3::new(x, y, z));
+        let normals = normals.map(|[x, y, z]| Vec3::new(x, y, z));
+        let [a, b, c] = normals;
         let smooth = self.normal(a * weights[0] + b * weights[1] + c * weights[2]);
         let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
         // `smooth` is NaN if the vertex normals cancel or the triangle has no area. `keep_visible`
         // replaces it by the geometric normal.
-        keep_visible(smooth, at.normal, direction)
+        let normal = keep_visible(smooth, at.normal, direction);
+        let outward = L::select(smooth.dot(at.normal).lt(L::zero()), -L::one(), L::one());
+        let mut lift = Vec3::zero();
+        for k in 0..3 {
+            let to_corner = plane.corners[k] - point;
+            let depth = normals[k].dot(to_corner) * outward;
+            let is_deep = depth.gt(L::zero())
+                & (depth * depth).gt(to_corner.length_squared() * L::from_f64(FLATTEST));
+            let up = self.normal(normals[k]);
+            let scale = weights[k] * depth * outward / up.length_squared();
+            lift += (up * scale).masked(is_deep);
+        }
+        let is_up = lift.dot(at.normal).gt(L::zero()) & lift.max_abs().lt(L::from_f64(L::MAX));
+        (normal, Some(lift.masked(is_up)))
     }
 
     /// Returns the colour of `triangle` in the mesh file; `None` if the file has no colours.
@@ -405,6 +436,49 @@ impl<S: Float> MeshInstance<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Checks the lift over a triangle with its corners on the unit sphere: at its centre, at the
+    /// distance d from the centre of the sphere, the projections onto the three tangent planes have
+    /// the mean distance d (2 - d^2). From inside, the sphere is concave.
+    #[test]
+    fn lift_of_a_triangle_in_a_sphere() {
+        let positions = vec![[0.8, 0.6, 0.0], [0.0, 0.8, 0.6], [0.6, 0.0, 0.8]];
+        let [low, high] = [[0.0; 3], [0.8; 3]];
+        let mesh = TriangleMesh {
+            normals: Some(positions.clone()),
+            positions,
+            center: [0.0; 3],
+            triangles: vec![[0, 1, 2]],
+            is_flat: false,
+            uvs: None,
+            colors: Vec::new(),
+            color_of: Vec::new(),
+            bounds: [low, high],
+            notes: Vec::new(),
+        };
+        let mesh = Arc::new(Mesh::new(mesh));
+        let middle = DVec3::splat(1.4 / 3.0);
+        let expected = middle * (1.0 - middle.length_squared());
+        let lift = |normals, scale: f64, side: f64| {
+            let scene_from_mesh = DAffine3::from_scale(DVec3::splat(scale));
+            let form = MeshForm { mesh: mesh.clone(), scene_from_mesh, normals };
+            let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
+            let normal = vector(DVec3::ONE.normalize() * side);
+            let at = SurfacePoint { point: vector(middle * scale), normal, max_coordinate: scale };
+            let instance = MeshInstance::<f64>::of(&form).unwrap();
+            let (_, lift) = instance.shading_normal(0.0, &at, -normal);
+            let lift = lift.map_or(DVec3::ZERO, |lift| DVec3::new(lift.x, lift.y, lift.z));
+            assert!(lift.length() <= form.max_lift(), "{lift}");
+            lift / scale
+        };
+        for scale in [1e-6, 1.0, 300.0] {
+            let outside = lift(MeshNormals::OfVertices, scale, 1.0);
+            assert!(outside.distance(expected) < 1e-6, "{outside}, not {expected}");
+            assert_eq!(lift(MeshNormals::OfVertices, scale, -1.0), DVec3::ZERO);
+            assert_eq!(lift(MeshNormals::Creased(180.0), scale, 1.0), DVec3::ZERO);
+            assert_eq!(lift(MeshNormals::Flat, scale, 1.0), DVec3::ZERO);
+        }
+    }
 
     #[test]
     fn triangle_distance_to_face_edge_and_corner() {

@@ -9,6 +9,8 @@ pub struct CornerNormals {
     pub normals: Vec<[f32; 3]>,
     /// Indices in `normals` for the corners of each triangle.
     pub corners: Vec<[u32; 3]>,
+    /// Tangent depth of the mesh with these normals.
+    pub depth: f64,
 }
 
 /// Number of triangles with which each triangle at a side is compared. A side of a surface has two
@@ -80,7 +82,29 @@ pub(super) fn creased(
         }
         index[corner as usize] = index[root];
     }
-    CornerNormals { normals, corners: index.as_chunks().0.to_vec() }
+    let corners = index.as_chunks().0.to_vec();
+    let depth = tangent_depth(positions, triangles, &normals, &corners);
+    CornerNormals { normals, corners, depth }
+}
+
+/// Returns the largest distance between a corner of a triangle and the tangent plane at another
+/// corner of it. `corners` has the indices in `normals` of each triangle.
+pub fn tangent_depth(
+    positions: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    normals: &[[f32; 3]],
+    corners: &[[u32; 3]],
+) -> f64 {
+    let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    let mut largest = 0.0f64;
+    for (triangle, corners) in triangles.iter().zip(corners) {
+        let p = triangle.map(|i| vector(positions[i as usize]));
+        for (corner, at) in corners.iter().zip(p) {
+            let normal = unit(vector(normals[*corner as usize]));
+            largest = p.into_iter().map(|p| normal.dot(p - at).abs()).fold(largest, f64::max);
+        }
+    }
+    largest
 }
 
 /// Returns the root of the tree of `node`, and shortens the way to it.
