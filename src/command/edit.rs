@@ -55,7 +55,8 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             (sampling, args.precision.precision)
         }
     };
-    let tone = file.as_ref().map_or_else(|_| Tone::default(), |file| file.scene().film.tone);
+    let tone =
+        file.as_ref().map_or_else(|_| Tone::default(), |file| file.document.scene().film.tone);
     let display = Display { tone, ..Display::default() };
     let setup = Setup {
         file,

@@ -189,8 +189,8 @@ fn render(
     };
     let end = rendered.end;
     let error = error_line(args, &rendered.report, end);
-    let printed = target
-        .deliver(&format!("{}\n{error}", summary(&args.output, size, &rendered.report, end)));
+    let printed =
+        target.deliver(&format!("{}\n{error}", summary(&args.output, size, &rendered.report, end)));
     if let Some(path) = &args.stats {
         let stats = stats::json(args, &hash, size, &rendered, started.elapsed());
         disk::write(path, stats.as_bytes())?;
@@ -405,7 +405,8 @@ fn schedule_settings(args: &RenderArgs, output: &ImageOutput) -> Settings {
         && args.error.is_none()
         && (args.rmse.is_some() || output.is_linear());
     let criterion = if linear { Criterion::Linear } else { Criterion::Levels };
-    let error = args.error.map(|levels| ErrorTarget { levels, quantization: quantization(args, output) });
+    let error =
+        args.error.map(|levels| ErrorTarget { levels, quantization: quantization(args, output) });
     let stop =
         Stop { spp: args.spp, noise_levels, rmse_linear: args.rmse, error, seconds: args.time };
     Settings { criterion, ..Settings::new(!args.uniform, stop) }

@@ -42,12 +42,11 @@ pub use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
 pub use zerkalo_render::export::Provenance;
 pub use zerkalo_render::film::file::FilmReader;
 pub use zerkalo_render::film::testing::TestFilm;
-pub use zerkalo_render::film::{Display, Film, Header, LightWeights, Replicates, TILE, Tile, Tone};
+pub use zerkalo_render::film::{Display, Film, Header, LightWeights, Replicates, TILE, Tile};
 pub use zerkalo_render::plan::{Plan, PlanSettings};
 pub use zerkalo_render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
 pub use zerkalo_render::session::{Session, State};
 pub use zerkalo_render::{Checkpoint, RenderState};
-pub use zerkalo_scene::TomlText;
 pub use zerkalo_scene::asset::Assets;
 pub use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
 pub use zerkalo_scene::disk::Existing;
@@ -65,5 +64,6 @@ pub use zerkalo_scene::{
     Acceleration, AssetResolver, BelowHorizon, Document, FIELDS, Filter, Object, RayTypes, Scale,
     Scene, TransformOp, edit,
 };
+pub use zerkalo_scene::{TomlText, Tone};
 pub use zerkalo_world as world;
 pub use zerkalo_world::{AnyWorld, FirstHit, MAX_GROUPS, Options, Precision, Radiance, World};

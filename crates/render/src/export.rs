@@ -6,8 +6,8 @@ use crate::film::{ByMeasure, Display};
 use crate::render_state::RenderState;
 use crate::session::Report;
 use zerkalo_kernel::sampling::SamplerKind;
-use zerkalo_scene::{Scene, Tone};
 use zerkalo_scene::value::Fnv1a64;
+use zerkalo_scene::{Scene, Tone};
 
 /// Origin of a picture: the part of its metadata that is not in its [`RenderState`].
 #[derive(Clone, Debug, PartialEq)]

@@ -5,6 +5,7 @@ use crate::film::testing::TestFilm;
 use crate::film::testing::{Rng, each_tile, fill, film, only, white};
 use crate::film::*;
 use crate::film::{Replicates, quantised_8};
+use zerkalo_scene::Tone;
 
 /// Pixel of known mean in a simulated picture. If `normal` is `false`, a sample is `dark + LIGHT`
 /// with probability `chance`, otherwise `dark`. If `normal` is `true`, sums of samples are normally

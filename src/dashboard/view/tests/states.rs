@@ -234,7 +234,7 @@ pub const STATES: &[Named] = &[
         let edit = edit::delete(m.scene(), &Target::Object(0)).unwrap();
         m.history.record(Arc::new(edit.scene), "delete", false);
         m.display.exposure_ev = 0.75;
-        m.display.tone = zerkalo_render::film::Tone::Neutral;
+        m.display.tone = zerkalo_scene::Tone::Neutral;
         let size = [1920, 1080];
         m.export = Some(RunningExport { size, progress: 0.43, left: None });
     }),
