@@ -21,7 +21,7 @@ const PATIENCE_OVER_SSH: Duration = Duration::from_secs(2);
 const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Request for the device attributes (DA1), to which every terminal replies.
-const ATTRIBUTES: &str = "\x1b[c";
+pub const ATTRIBUTES: &str = "\x1b[c";
 /// Requests of the capability query, in this order:
 /// - a 24-bit colour is set, the current colour is requested (DECRQSS), and the default is restored
 /// - name and version of the terminal (XTVERSION)

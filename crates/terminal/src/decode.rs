@@ -20,17 +20,16 @@
 //! - `vte` ends a DCS string at the byte 9C, which is also part of UTF-8 characters such as Ü.
 //! - `vte` keeps a control sequence open across control characters. Without special treatment, a
 //!   key typed after an incomplete sequence would be lost.
+//! - A reply may be cut off, so that the next key continues its sequence. A key is one character in
+//!   a read of its own. It is decoded as a key if the sequence is not completed by it or after it.
 
 use crate::event::Code;
 use crate::sequence::{Interpreter, console_key, single_shift, x10_mouse};
 use crate::{Event, Key, Reply};
 use std::time::Duration;
 
-/// Longest pause after the first two bytes of an escape sequence. After a longer pause, the second
-/// byte is a key pressed with Alt.
-const INTRODUCER_WAIT: Duration = Duration::from_millis(500);
-/// Longest pause inside an escape sequence.
-const SEQUENCE_WAIT: Duration = Duration::from_secs(2);
+/// Longest pause after an ESC or Ctrl-C that may end a paste.
+const PASTE_KEY_WAIT: Duration = Duration::from_millis(500);
 /// Longest pause inside pasted text, after which the text so far is reported.
 const PASTE_WAIT: Duration = Duration::from_secs(10);
 /// Largest number of bytes of a control string that are kept.
@@ -83,27 +82,72 @@ pub struct Decoder {
     taken: Vec<u8>,
     /// Number of bytes of the control string so far.
     string_length: usize,
-    escape_wait: Duration,
-    /// `true` if the last byte was an ESC that was reported as the key Escape.
-    escape_given_up: bool,
+    /// Longest pause inside an escape sequence.
+    sequence_wait: Duration,
+    /// Bytes of the current sequence, at most [`MAX_STRING`]. After it was given up, they are kept
+    /// until the next read.
+    sequence: Vec<u8>,
+    /// Characters of the sequence that may be keys: each arrived in a read of its own.
+    possible_keys: Vec<u8>,
+    /// `true` if the read consists of one character, which may be a key.
+    is_possible_key: bool,
 }
 
 impl Decoder {
-    /// Creates a decoder. `escape_wait` is the longest pause between ESC and the rest of a
-    /// sequence.
-    pub fn new(escape_wait: Duration) -> Self {
-        Self { escape_wait, ..Self::default() }
+    /// Creates a decoder. `sequence_wait` is the longest pause inside an escape sequence.
+    pub fn new(sequence_wait: Duration) -> Self {
+        Self { sequence_wait, ..Self::default() }
     }
 
     /// Decodes the result of one read, and returns the events that it completes.
     pub fn take(&mut self, bytes: &[u8]) -> Vec<Event> {
-        if std::mem::take(&mut self.escape_given_up) && is_reply_without_escape(bytes) {
-            self.state = State::Escape;
+        if let Some(events) = self.rest_of_reply(bytes) {
+            return events;
         }
+        let outside = [State::Ground, State::Character, State::Escape];
+        let is_one = std::str::from_utf8(bytes).is_ok_and(|text| text.chars().count() == 1);
+        self.is_possible_key = is_one && !outside.contains(&self.state);
         for byte in bytes {
+            if self.state == State::Ground {
+                self.sequence.clear();
+            }
+            if self.sequence.len() < MAX_STRING {
+                self.sequence.push(*byte);
+            }
             self.byte(*byte);
         }
+        match self.state {
+            State::Ground => self.sequence.clear(),
+            state if self.is_possible_key && !outside.contains(&state) => {
+                self.possible_keys.extend(bytes);
+            }
+            _ => {}
+        }
         std::mem::take(&mut self.interpreter.events)
+    }
+
+    /// Returns the events of `bytes` if they can only be the rest of a sequence that was given up:
+    /// typed keys would not arrive in one read.
+    fn rest_of_reply(&mut self, bytes: &[u8]) -> Option<Vec<Event>> {
+        if self.state != State::Ground || self.sequence.first() != Some(&ESC) {
+            return None;
+        }
+        let sequence = std::mem::take(&mut self.sequence);
+        let is_modified_key = sequence == [ESC] && matches!(bytes, [b'[', b'0'..=b'9', _, ..]);
+        let mut decoder = Self::new(self.sequence_wait);
+        decoder.take(&sequence);
+        let events = decoder.take(bytes);
+        let is_rest = bytes.len() > 1
+            && sequence.len() + bytes.len() > 3
+            && match events.first() {
+                Some(Event::Reply(_) | Event::Mouse(_)) => true,
+                Some(Event::Key(_)) => is_modified_key,
+                Some(Event::Paste(_)) | None => false,
+            };
+        is_rest.then(|| {
+            *self = decoder;
+            events
+        })
     }
 
     /// Returns the longest time to wait for the next byte of the current sequence. Returns `None`
@@ -111,12 +155,10 @@ impl Decoder {
     pub fn patience(&self) -> Option<Duration> {
         match self.state {
             State::Ground => None,
-            State::Escape => Some(self.escape_wait),
-            State::Introducer(_) => Some(INTRODUCER_WAIT),
             State::Paste => Some(PASTE_WAIT),
             State::PausedPaste if self.taken.is_empty() => None,
-            State::PausedPaste => Some(INTRODUCER_WAIT),
-            _ => Some(SEQUENCE_WAIT),
+            State::PausedPaste => Some(PASTE_KEY_WAIT),
+            _ => Some(self.sequence_wait),
         }
     }
 
@@ -127,7 +169,9 @@ impl Decoder {
             State::Paste | State::PausedPaste => self.pause_paste(),
             _ => {
                 self.abandon();
-                self.restart();
+                if self.state == State::Escape {
+                    self.give_up_escape();
+                }
             }
         }
         std::mem::take(&mut self.interpreter.events)
@@ -148,7 +192,7 @@ impl Decoder {
             State::StringEscape if byte == b'\\' => self.end_string(b"\x1b\\"),
             State::StringEscape => {
                 // Another sequence interrupts the string.
-                self.restart();
+                self.abandon();
                 self.state = State::Escape;
                 self.byte(byte);
             }
@@ -221,9 +265,16 @@ impl Decoder {
         match (self.state, byte) {
             (State::ControlSequence, 0x20..=0x3f) => self.parse(&[byte]),
             (State::ControlSequence, 0x40..=0x7e) => {
+                self.interpreter.is_known = false;
                 self.parse(&[byte]);
-                let is_paste = std::mem::take(&mut self.interpreter.is_paste);
-                self.state = if is_paste { State::Paste } else { State::Ground };
+                if self.is_possible_key && !self.interpreter.is_known {
+                    self.abandon();
+                    return self.byte(byte);
+                }
+                self.restart();
+                if std::mem::take(&mut self.interpreter.is_paste) {
+                    self.state = State::Paste;
+                }
             }
             (State::Console, _) => self.complete(console_key(byte)),
             (State::X10Mouse, _) => {
@@ -243,7 +294,7 @@ impl Decoder {
             }
             (State::String(_), ESC) => self.state = State::StringEscape,
             (State::String(b']'), BEL) => self.end_string(b"\x07"),
-            (State::String(_), CAN | SUB) => self.restart(),
+            (State::String(_), CAN | SUB) => self.abandon(),
             (State::String(b'P' | b'_'), 0x80..) => {}
             (State::String(_), _) => {
                 self.string_length += 1;
@@ -251,7 +302,10 @@ impl Decoder {
                     self.parse(&[byte]);
                 }
             }
-            _ => self.in_ground(byte),
+            _ => {
+                self.abandon();
+                self.byte(byte);
+            }
         }
     }
 
@@ -265,6 +319,7 @@ impl Decoder {
         self.interpreter.alt = false;
         self.state = State::Ground;
         self.taken.clear();
+        self.possible_keys.clear();
     }
 
     /// Decodes `byte` as the first byte of a new sequence. A pending Alt modifier applies to it.
@@ -323,26 +378,18 @@ impl Decoder {
 
     fn give_up_escape(&mut self) {
         self.restart();
-        self.escape_given_up = true;
         self.interpreter.press(Key::plain(Code::Esc));
     }
 
-    /// Ends an incomplete sequence. Its first two bytes alone are a key such as Alt-`[`.
+    /// Ends an incomplete sequence, and decodes the keys that it may have swallowed. The first two
+    /// bytes of a sequence alone are a key such as Alt-`[`.
     fn abandon(&mut self) {
         if let State::Introducer(introducer) = self.state {
             self.interpreter.alt = true;
             self.interpreter.press(Key::plain(Code::Char(char::from(introducer))));
         }
+        let keys = std::mem::take(&mut self.possible_keys);
+        self.restart();
+        keys.into_iter().for_each(|byte| self.byte(byte));
     }
-}
-
-/// Returns `true` if the result of one read can only be the rest of a reply whose ESC was read
-/// before. The bytes of typed keys would not arrive in one read.
-fn is_reply_without_escape(bytes: &[u8]) -> bool {
-    matches!(
-        bytes,
-        [b'[', b'?' | b'>' | b'0'..=b'9', _, ..]
-            | [b']' | b'P', b'0'..=b'9' | b'>', _, ..]
-            | [b'_', b'G', _, ..]
-    )
 }

@@ -6,10 +6,10 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{self, Stdin};
 use std::time::{Duration, Instant};
 
-/// Longest pause between ESC and the rest of its sequence.
-const ESCAPE_WAIT: Duration = Duration::from_millis(40);
-/// Longest pause between ESC and the rest of its sequence over SSH, where packets can divide it.
-const ESCAPE_WAIT_OVER_SSH: Duration = Duration::from_millis(120);
+/// Longest pause inside an escape sequence.
+const SEQUENCE_WAIT: Duration = Duration::from_millis(40);
+/// Longest pause inside an escape sequence over SSH, where packets can divide it.
+const SEQUENCE_WAIT_OVER_SSH: Duration = Duration::from_millis(120);
 
 /// Terminal event with the time at which it was read.
 #[derive(Debug)]
@@ -23,18 +23,22 @@ pub struct InputReader {
     stdin: Stdin,
     decoder: Decoder,
     buffer: Vec<u8>,
+    /// Time from which the rest of a sequence is awaited. A single byte, which may be a key, does
+    /// not extend the wait.
+    waits_since: Instant,
     /// Events that were read during the capability query, for the next [`InputReader::wait`].
     pub(super) early: Vec<TimedEvent>,
 }
 
 impl InputReader {
-    /// Creates a reader. Over SSH it waits longer for the byte after an ESC.
+    /// Creates a reader. Over SSH it waits longer for the rest of a sequence.
     pub fn new(environment: &Environment) -> Self {
-        let wait = if environment.ssh.is_some() { ESCAPE_WAIT_OVER_SSH } else { ESCAPE_WAIT };
+        let wait = if environment.ssh.is_some() { SEQUENCE_WAIT_OVER_SSH } else { SEQUENCE_WAIT };
         Self {
             stdin: io::stdin(),
             decoder: Decoder::new(wait),
             buffer: vec![0; 1 << 14],
+            waits_since: Instant::now(),
             early: Vec::new(),
         }
     }
@@ -50,7 +54,8 @@ impl InputReader {
         loop {
             let now = Instant::now();
             let time_left = deadline.map(|deadline| deadline.saturating_duration_since(now));
-            let patience = self.decoder.patience();
+            let waited = now.saturating_duration_since(self.waits_since);
+            let patience = self.decoder.patience().map(|wait| wait.saturating_sub(waited));
             let gives_up = patience.is_some_and(|p| time_left.is_none_or(|left| p <= left));
             let wait = if gives_up { patience } else { time_left };
             let wait = wait.and_then(|wait| Timespec::try_from(wait).ok());
@@ -67,6 +72,9 @@ impl InputReader {
                     Err(rustix::io::Errno::INTR | rustix::io::Errno::AGAIN) => continue,
                     Err(error) => return Err(error.into()),
                 };
+                if read > 1 || patience.is_none() {
+                    self.waits_since = Instant::now();
+                }
                 self.decoder.take(&self.buffer[..read])
             } else if gives_up {
                 self.decoder.give_up()

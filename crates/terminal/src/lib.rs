@@ -34,7 +34,7 @@ mod tests;
 
 use crate::event::{Key, Mouse};
 pub use capabilities::{Capabilities, Environment, Multiplexer};
-pub use capability_query::{query_capabilities, query_passthrough};
+pub use capability_query::{ATTRIBUTES, query_capabilities, query_passthrough};
 pub use clipboard::copied;
 pub use decode::Decoder;
 pub use hyperlink::hyperlink;

@@ -149,20 +149,29 @@ impl Tty {
     /// Suspends full-screen use until [`Tty::resume`]. Returns `false` if the terminal is restored
     /// already.
     pub fn suspend(&self) -> bool {
+        self.suspend_after("", || false)
+    }
+
+    /// Suspends full-screen use as [`Tty::suspend`] does, and sends `request`. The modes are restored
+    /// after `wait`, which returns `true` if the terminal has replied to all requests.
+    pub fn suspend_after(&self, request: &str, wait: impl FnOnce() -> bool) -> bool {
         if !self.entered.swap(false, Ordering::AcqRel) {
             return false;
         }
         // If the terminal has stopped reading, another thread may hold the lock without limit.
         if let Some(mut out) = self.lock_within(PATIENCE) {
             let mut bytes = std::mem::take(&mut *locked(&self.exit_sequence));
-            bytes.extend(LEAVE.as_bytes());
+            bytes.extend([request, LEAVE].concat().as_bytes());
             // A terminal that is gone needs no restoration.
             let _ = out.write_all(&bytes).and_then(|()| out.flush());
         }
+        let has_replied = wait();
         if let Some(modes_before) = &self.modes_before {
             let _ = set_modes(modes_before);
-            // The shell would otherwise read late replies.
-            let _ = tcflush(io::stdin(), QueueSelector::IFlush);
+            if !has_replied {
+                // The shell would otherwise read late replies.
+                let _ = tcflush(io::stdin(), QueueSelector::IFlush);
+            }
         }
         true
     }

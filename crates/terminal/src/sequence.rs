@@ -16,6 +16,8 @@ pub struct Interpreter {
     pub is_character_complete: bool,
     /// `true` if the last control sequence begins a bracketed paste.
     pub is_paste: bool,
+    /// `true` if the last control sequence is a key, a mouse report or a reply.
+    pub is_known: bool,
     /// `true` if the control string began as an APC string (`ESC _`), which the parser gets as a
     /// device control string.
     pub is_apc: bool,
@@ -51,7 +53,9 @@ impl Perform for Interpreter {
     fn csi_dispatch(&mut self, params: &Params, intermediates: &[u8], _: bool, last: char) {
         let params: Vec<_> = params.iter().collect();
         self.is_paste = intermediates.is_empty() && last == '~' && *params == [[200]];
-        self.events.extend(control_sequence(&params, intermediates, last));
+        let event = control_sequence(&params, intermediates, last);
+        self.is_known = self.is_paste || event.is_some();
+        self.events.extend(event);
     }
 
     fn hook(&mut self, params: &Params, intermediates: &[u8], _: bool, last: char) {
@@ -98,7 +102,8 @@ fn character(c: char) -> Option<Key> {
 }
 
 /// Interprets a control sequence. `params` are its parameters, each with subparameters;
-/// `intermediates` are its private marker and intermediate bytes; `last` is its final byte.
+/// `intermediates` are its private marker and intermediate bytes; `last` is its final byte. Returns
+/// `None` for an unknown sequence.
 fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Option<Event> {
     let numbers: Vec<_> = params.iter().map(|param| param[0]).collect();
     let reply = match (intermediates, last, &numbers[..]) {
@@ -112,11 +117,12 @@ fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Opti
         (b"?", 'S', &[2, 0, width, height]) => Reply::SixelSize([width, height]),
         (b"", 'n', [0]) => Reply::Status,
         (b"", 't', &[6, height, width]) => Reply::CellSize([width, height]),
-        (b"", 'n' | 't' | 'x' | 'c', _) => Reply::Other,
+        (b"", 'n' | 't' | 'x' | 'c', _) | (b"", 'I' | 'O', [0]) => Reply::Other,
+        (b"?", 'n' | 'R' | 'S' | 'u', _) | (b">" | b"=", 'c', _) | (b"$", 'y', _) => Reply::Other,
         // Position of the cursor. For row 1, columns 2 to 16 are decoded as F3 with modifiers.
         (b"", 'R', [(2..), _] | [1, ..2 | 17..]) => Reply::Other,
         (b"", ..) => return key(params, last).map(Event::Key),
-        _ => Reply::Other,
+        _ => return None,
     };
     Some(Event::Reply(reply))
 }

@@ -11,12 +11,18 @@ use crate::dashboard::update::update;
 use crate::dashboard::{Effect, Message, Model, Overlay};
 use crossbeam_channel::{Receiver, after, never, select};
 use std::io;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_render::session::{Snapshot, State};
-use zerkalo_terminal::{Event, HUNG_UP, Reply, TimedEvent};
+use zerkalo_terminal::{ATTRIBUTES, Capabilities, Event, HUNG_UP, Reply, TimedEvent};
 
 /// Shortest interval between updates of the displayed connection status or upload progress.
 pub const STATUS_INTERVAL: Duration = Duration::from_millis(500);
+
+/// Time after which a terminal that has never replied counts as one without replies.
+const FIRST_REPLY: Duration = Duration::from_secs(5);
+/// Longest wait for the last reply of the terminal, besides two round trips.
+const LAST_REPLY: Duration = Duration::from_millis(400);
 
 /// Dashboard on a terminal.
 pub struct Dashboard {
@@ -40,6 +46,8 @@ pub struct Dashboard {
     pub resting: bool,
     /// `true` if the model has changed since the last frame.
     pub changed: bool,
+    /// `true` if the terminal has reported its attributes since [`Dashboard::suspend_terminal`].
+    pub is_last_reply: bool,
     /// `true` if the program is to be suspended after the present messages.
     pub suspend: bool,
     /// `true` if the program is to quit after the present messages.
@@ -130,6 +138,11 @@ impl Dashboard {
             Event::Key(key) => Message::Key(key),
             Event::Mouse(mouse) => Message::Mouse(mouse),
             Event::Paste(text) => Message::Paste(text),
+            Event::Reply(_) if self.frames.terminal.round_trip.is_none() => {
+                self.frames.terminal.round_trip = Some(self.began.elapsed() + FIRST_REPLY);
+                self.enqueue(TimedEvent { at, event }, waiting);
+                return;
+            }
             Event::Reply(Reply::Status) => {
                 self.frames.flow.on_ack(at.saturating_duration_since(self.began));
                 return;
@@ -144,6 +157,7 @@ impl Dashboard {
             ) => {
                 // A terminal behind a multiplexer or a slow line may reply only after the capability
                 // query has ended.
+                self.is_last_reply |= matches!(reply, Reply::Attributes(_));
                 self.frames.terminal.learn(&reply);
                 let terminal = Box::new(self.frames.terminal.clone());
                 self.dispatch(Message::Terminal(terminal));
@@ -154,17 +168,27 @@ impl Dashboard {
         input::join(waiting, Input { at, message });
     }
 
-    /// Waits for outstanding replies of the terminal. Without the wait, the shell would read them
-    /// as input.
-    pub fn await_answers(&mut self) {
-        let end = self.frames.flow.awaits().map(|wait| Instant::now() + wait);
-        while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
-            let Ok(event) = self.terminal_io.input.recv_timeout(left) else { break };
-            self.enqueue(event, &mut Vec::new());
-            if self.frames.flow.awaits().is_none() {
-                break;
-            }
+    /// Restores the terminal after its last replies. Without the wait, the shell would read them as
+    /// input.
+    pub fn suspend_terminal(&mut self) {
+        let tty = Arc::clone(&self.terminal_io.tty);
+        tty.suspend_after(ATTRIBUTES, || self.await_replies());
+    }
+
+    /// Waits for the reply to the last request, and for other outstanding replies. Returns `false`
+    /// if some may arrive later.
+    fn await_replies(&mut self) -> bool {
+        let Capabilities { round_trip, passthrough, .. } = self.frames.terminal;
+        if round_trip.is_none() && self.began.elapsed() > FIRST_REPLY {
+            return false;
         }
+        let end = Instant::now() + LAST_REPLY + 2 * round_trip.max(passthrough).unwrap_or_default();
+        self.is_last_reply = false;
+        while !self.is_last_reply || self.frames.flow.awaits_replies() {
+            let Ok(event) = self.terminal_io.input.recv_deadline(end) else { return false };
+            self.enqueue(event, &mut Vec::new());
+        }
+        true
     }
 
     /// Updates the model and executes the effects. Returns the generation of the picture that

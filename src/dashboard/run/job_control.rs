@@ -100,8 +100,7 @@ impl Dashboard {
     pub(super) fn suspend(&mut self, stop: fn() -> rustix::io::Result<()>) -> Option<u8> {
         // Unsaved edits are written first, because the program may never be resumed.
         self.effects.flush(SECURED_WITHIN);
-        self.await_answers();
-        self.terminal_io.tty.suspend();
+        self.suspend_terminal();
         let mut stopped = stop().is_ok();
         while stopped {
             match self.terminal_io.signals.recv_timeout(STOPS_WITHIN) {

@@ -167,6 +167,7 @@ fn run_on_terminal(
         status_sent_at: Duration::ZERO,
         resting: false,
         changed: true,
+        is_last_reply: false,
         suspend: false,
         quit: false,
     };
@@ -191,7 +192,7 @@ fn end(
     // The autosave thread writes unsaved edits before this thread may block.
     dashboard.effects.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
-        dashboard.await_answers();
+        dashboard.suspend_terminal();
     }
     // The terminal is restored first, because the remaining writes may take a while.
     drop(screen);

@@ -59,6 +59,8 @@ const ROUND_TRIP_INTERVAL: Duration = Duration::from_secs(30);
 const NEW_WEIGHT: f64 = 0.3;
 /// Time after input during which the user counts as active.
 const ACTIVE_TIME: Duration = Duration::from_millis(500);
+/// Longest time for which the effect of input waits because a relay may hold bytes.
+const LONGEST_ANSWER: Duration = Duration::from_millis(300);
 /// Time after the user was active from which a relay may be filled to measure its rate.
 const IDLE_AFTER: Duration = Duration::from_secs(2);
 /// Interval at which the send queue is measured.
@@ -257,7 +259,8 @@ impl FlowControl {
             // By this time the oldest frame is acknowledged or lost.
             Pacing::AckClocked(clock) => clock.lost_at().unwrap_or(frame),
             Pacing::SendQueue(_) => {
-                frame.max(self.measures_at(now).unwrap_or(now)).max(self.free_at)
+                let free_at = self.free_at.min(after(LONGEST_ANSWER));
+                frame.max(self.measures_at(now).unwrap_or(now)).max(free_at)
             }
             Pacing::FixedRate => frame.max(self.free_at),
         };
@@ -364,16 +367,14 @@ impl FlowControl {
         }
     }
 
-    /// Returns the longest time to wait for outstanding replies at the end of the program; `None` if
-    /// there are none.
-    pub fn awaits(&self) -> Option<Duration> {
-        let is_waiting = match &self.pacing {
+    /// Returns `true` if the terminal has not replied to all requests.
+    pub fn awaits_replies(&self) -> bool {
+        match &self.pacing {
             Pacing::AckClocked(clock) => !clock.in_flight.is_empty(),
             Pacing::Unlimited | Pacing::SendQueue(_) | Pacing::FixedRate => {
                 self.suspended.is_some()
             }
-        };
-        is_waiting.then(|| 2 * self.round_trip.unwrap_or_default() + 2 * FRAME_SPAN)
+        }
     }
 
     /// Returns the largest number of bytes of the next frame.
@@ -413,7 +414,11 @@ impl FlowControl {
                 // With a shorter queue, the effect of user input waits for fewer bytes.
                 let spare = if is_active { self.budget() as f64 / 2.0 } else { 0.0 };
                 let lead = if answers { FRAME_SPAN } else { Duration::ZERO };
-                let is_free = extra > 0.0 || self.free_at <= now + lead;
+                // Later effects wait for them, but not so long that a wrong estimate delays them much.
+                let is_rare = answers
+                    && queue.bytes == 0.0
+                    && self.last_frame.is_none_or(|at| at + LONGEST_ANSWER <= now);
+                let is_free = extra > 0.0 || is_rare || self.free_at <= now + lead;
                 is_free && queue.bytes < self.max_queue() + extra - spare
             }
             Pacing::FixedRate => {

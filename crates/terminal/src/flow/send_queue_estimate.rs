@@ -55,12 +55,14 @@ pub struct SendQueueEstimate {
     is_full: bool,
     /// Time at which the queue was last full.
     full_at: Duration,
-    /// Time at which the queue became full, and number of bytes that had left it in total. `None`
-    /// if it was not, or if the connection may have been idle since.
-    filled: Option<(Duration, f64)>,
+    /// Times at which the queue became full since the connection may have been idle, and numbers of
+    /// bytes that had left it in total. A relay may offer room before it is full, so that it holds
+    /// fewer bytes at the first of these times than at the others.
+    fills: Vec<(Duration, f64)>,
     /// Last measured rate, or the rate when the queue first became full; infinite before that.
     pub settled_rate: f64,
-    /// Estimated largest number of bytes that a relay holds. It increases until `learns_until`.
+    /// Estimated largest number of bytes that a relay holds: a mean of estimates until
+    /// `learns_until`.
     capacity: f64,
     learns_until: Duration,
     /// Earliest time at which the rate may grow.
@@ -120,7 +122,7 @@ impl SendQueueEstimate {
         self.frames.push_back((now, bytes as f64));
         let is_kept_busy = now <= free_at.max(self.full_at) + LATENESS;
         if !is_kept_busy {
-            self.filled = None;
+            self.fills.clear();
         }
         is_kept_busy
     }
@@ -138,7 +140,9 @@ impl SendQueueEstimate {
 
     /// Returns the time at which the next frame may be sent if the rate is `rate`.
     pub fn free_at(&self, rate: f64) -> Duration {
-        self.transmitted_at(PACE * rate)
+        let paced =
+            |(at, bytes): &(Duration, f64)| *at + Duration::from_secs_f64(bytes / PACE / rate);
+        self.frames.back().map_or(Duration::ZERO, paced).max(self.transmitted_at(rate))
     }
 
     /// Returns the time at which a connection of `rate` bytes per second has transmitted all frames.
@@ -176,7 +180,7 @@ impl SendQueueEstimate {
         self.doubtful_rate = self.doubtful_rate.max(settled / 2.0);
         if now < self.learns_until {
             let relayed = self.relayed(now, settled).min(settled * MEMORY.as_secs_f64());
-            self.capacity = self.capacity.max(relayed);
+            self.capacity = if is_first { relayed } else { (self.capacity + relayed) / 2.0 };
         }
         // Earlier frames were transmitted at another rate.
         while self.relayed(now, settled) > self.capacity {
@@ -230,6 +234,7 @@ impl SendQueueEstimate {
             busy.progress = now;
             busy.most_drained = drained;
         }
+        let progress = busy.progress;
         let alone = busy.alone.filter(|_| bytes == 0);
         let alone = alone.map(|bytes| LoneFrame { bytes, round_trip: now - busy.since });
         if bytes == 0 {
@@ -243,7 +248,7 @@ impl SendQueueEstimate {
             self.full_at = now;
         }
         let is_filled = self.is_full && !was_full;
-        let rate = if is_filled { self.filled(now, drained) } else { None };
+        let rate = if is_filled { self.filled(progress, drained) } else { None };
         QueueSample { alone, is_filled, rate }
     }
 
@@ -251,8 +256,10 @@ impl SendQueueEstimate {
     /// since the queue became full before, and the time over which it is measured.
     fn filled(&mut self, now: Duration, drained: f64) -> Option<(f64, Duration)> {
         self.grows_at = self.grows_at.max(now + GROWTH_PAUSE[0]);
-        let earlier = self.filled.filter(|(since, _)| now <= *since + LONGEST_SAMPLE);
-        let (since, before) = *self.filled.insert(earlier.unwrap_or((now, drained)));
+        self.fills.push((now, drained));
+        self.fills.retain(|(at, _)| now <= *at + LONGEST_SAMPLE);
+        let is_first = self.learns_until == Duration::ZERO;
+        let &(since, before) = self.fills.get(usize::from(is_first || self.fills.len() > 2))?;
         let span = now - since;
         (span >= SHORTEST_SAMPLE).then(|| ((drained - before) / span.as_secs_f64(), span))
     }
