@@ -12,6 +12,7 @@ use zerkalo_render::plan::MAX_SHARDS;
 use zerkalo_scene::disk::{Existing, Replacement, WriteError, check_writable};
 use zerkalo_scene::{Acceleration, Scene, Tone};
 use zerkalo_terminal::Environment;
+use zerkalo_terminal::cells::Blocks;
 use zerkalo_terminal::image::GraphicsMode;
 use zerkalo_world::Precision;
 
@@ -420,11 +421,22 @@ const COLORS: [Choice<ColorChoice>; 5] = [
     ("none", Some("No colours"), Some(Colors::Mono)),
 ];
 
-const GRAPHICS: [Choice<GraphicsMode>; 4] = [
+const GRAPHICS: [Choice<GraphicsMode>; 7] = [
     ("auto", None, GraphicsMode::Automatic),
     ("kitty", Some("Kitty's graphics protocol"), GraphicsMode::Kitty),
     ("sixel", Some("Sixel"), GraphicsMode::Sixel),
-    ("cells", Some("Half blocks in cells of the terminal"), GraphicsMode::Cells),
+    ("cells", Some("Half blocks in cells of the terminal"), GraphicsMode::Cells(Blocks::Halves)),
+    ("quadrants", Some("2 x 2 pixels in a cell"), GraphicsMode::Cells(Blocks::Quadrants)),
+    (
+        "sextants",
+        Some("2 x 3 pixels; `doctor` tests the font"),
+        GraphicsMode::Cells(Blocks::Sextants),
+    ),
+    (
+        "octants",
+        Some("2 x 4 pixels; `doctor` tests the font"),
+        GraphicsMode::Cells(Blocks::Octants),
+    ),
 ];
 
 const DEPTHS: [Choice<Depth>; 2] = [("8", None, Depth::Eight), ("16", None, Depth::Sixteen)];

@@ -11,6 +11,7 @@ use serde_json::{Map, Value};
 use std::env;
 use std::time::Duration;
 use zerkalo_scene::value::sanitized;
+use zerkalo_terminal::cells::Blocks;
 use zerkalo_terminal::flow::PacingMode;
 use zerkalo_terminal::image::{GraphicsMode, Protocol};
 use zerkalo_terminal::{Capabilities, Environment, Multiplexer};
@@ -55,6 +56,10 @@ impl DoctorReport {
         let mut lines = vec![format!("zerkalo {}", env!("CARGO_PKG_VERSION")), String::new()];
         let row = |(name, value): (&str, String)| indented(&format!("{name:<NAME$}"), &value);
         lines.extend(self.rows().into_iter().map(row));
+        if self.is_utf8() && self.level() == Colors::True {
+            lines.extend([String::new(), FONT.to_string()]);
+            lines.extend(test_card());
+        }
         let hints = self.hints();
         if !hints.is_empty() {
             lines.extend([String::new(), "hints".to_string()]);
@@ -213,6 +218,35 @@ impl DoctorReport {
         ];
         hints.into_iter().filter(|(applies, _)| *applies).map(|(_, hint)| hint).collect()
     }
+}
+
+/// Explanation of the test card.
+const FONT: &str = "font: --graphics quadrants, sextants or octants where the zigzag has no gaps";
+
+/// Returns the lines of frames with a zigzag in each set of block characters.
+fn test_card() -> Vec<String> {
+    const CELLS: [usize; 2] = [16, 2];
+    let mut lines = vec![String::new(); CELLS[1] + 2];
+    for blocks in [Blocks::Quadrants, Blocks::Sextants, Blocks::Octants] {
+        let grid = blocks.grid();
+        let height = CELLS[1] * grid[1];
+        let is_below = |x: usize, y: usize| (x % (2 * height)).abs_diff(height) > height - 1 - y;
+        let glyph = |column: usize, row: usize| {
+            let pixel = |i: usize| [column * grid[0] + i % grid[0], row * grid[1] + i / grid[0]];
+            let mask = (0..grid[0] * grid[1]).map(|i| {
+                let [x, y] = pixel(i);
+                usize::from(is_below(x, y)) << i
+            });
+            blocks.glyph(mask.sum())
+        };
+        lines[0] += &format!("┌{:─<1$}┐ ", format!(" {} ", blocks.name()), CELLS[0]);
+        for row in 0..CELLS[1] {
+            let zigzag: String = (0..CELLS[0]).map(|column| glyph(column, row)).collect();
+            lines[1 + row] += &format!("│{zigzag}│ ");
+        }
+        lines[CELLS[1] + 1] += &format!("└{}┘ ", "─".repeat(CELLS[0]));
+    }
+    lines
 }
 
 /// Returns `name` followed by `value`, wrapped with a hanging indent.

@@ -1,6 +1,7 @@
 //! Protocol that shows the picture in its panel.
 
 use zerkalo_terminal::Capabilities;
+use zerkalo_terminal::cells::{Blocks, Colors};
 use zerkalo_terminal::image::{GraphicsMode, Protocol};
 
 #[derive(Clone, Debug)]
@@ -14,7 +15,7 @@ pub struct Graphics {
 
 impl Default for Graphics {
     fn default() -> Self {
-        Self::new(Capabilities::default(), GraphicsMode::Cells)
+        Self::new(Capabilities::default(), GraphicsMode::Cells(Blocks::Halves))
     }
 }
 
@@ -30,9 +31,20 @@ impl Graphics {
         Some(cell.map(usize::from))
     }
 
+    /// Returns the block characters that show the picture in cells with `colors`.
+    pub fn blocks(&self, colors: Colors) -> Blocks {
+        match self.mode {
+            GraphicsMode::Cells(blocks) if colors == Colors::True => blocks,
+            _ => Blocks::Halves,
+        }
+    }
+
     /// Describes protocol and reason, such as `cells, as the terminal reports no image protocol`.
     pub fn description(&self) -> String {
         match self.protocol {
+            Protocol::Blocks if self.blocks(self.terminal.colors) != Blocks::Halves => {
+                format!("{}, {}", self.blocks(self.terminal.colors).name(), self.reason)
+            }
             Protocol::Blocks => format!("cells, {}", self.reason),
             protocol => format!("{}, {}", protocol.name(), self.reason),
         }

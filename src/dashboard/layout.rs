@@ -26,6 +26,8 @@ pub struct Layout {
     /// terminal cell, and is treated as square. If the number of rows is odd, the last row consists
     /// of upper halves.
     pub raster: [usize; 2],
+    /// Columns and rows of the pixels that the block characters of the picture show.
+    pub texels: [usize; 2],
     /// Window of the film that the picture shows.
     pub window: Window,
     /// Pixels of the screen that show the picture if the terminal shows images and if pixels show
@@ -103,9 +105,10 @@ impl Model {
         let image = centred(inside, raster);
         let cells = PictureCells { image, raster, window, pixels: None };
         let PictureCells { image, raster, window, pixels } = match self.graphics.cell_px() {
-            Some(cell) => cells.with_pixels(inside, self.zoom.is_none(), cell),
+            Some(cell) => cells.with_pixels(inside, cell, self.zoom, film),
             None => cells,
         };
+        let grid = self.graphics.blocks(self.colors).grid();
         let [outline, inspector, plot] = match side {
             0 => [None; 3],
             _ => self.side_panels(Rect { x: width - side, y: 0, width: side, height: rows }),
@@ -114,6 +117,7 @@ impl Model {
             picture,
             image,
             raster,
+            texels: [raster[0] * grid[0], (raster[1] * grid[1]).div_ceil(2)],
             window,
             pixels,
             outline,
@@ -192,24 +196,34 @@ struct PictureCells {
 }
 
 impl PictureCells {
-    /// Adds the pixels of the picture, unless cells show each pixel of the film. A film pixel is a
-    /// square, of whole pixels of the screen if the film fits into `inside`. The cells then show
-    /// the part of the film that covers them exactly.
-    fn with_pixels(self, inside: Rect, is_whole: bool, cell: [usize; 2]) -> Self {
-        let Self { image, raster, window, .. } = self;
-        if raster[0] >= window.size[0] {
+    /// Adds the pixels of the picture, unless cells show each pixel of the film as a square. A film
+    /// pixel is a square, of whole pixels of the screen if the film fits into `inside`. The cells
+    /// then show the part of the film that covers them exactly.
+    fn with_pixels(
+        self,
+        inside: Rect,
+        cell: [usize; 2],
+        zoom: Option<Zoom>,
+        film: [u32; 2],
+    ) -> Self {
+        let Self { raster, window, .. } = self;
+        if raster[0] >= window.size[0] && (zoom.is_none() || cell[1] == 2 * cell[0]) {
             return self;
         }
         let room = [usize::from(inside.width) * cell[0], usize::from(inside.height) * cell[1]];
-        if !is_whole {
-            let size = [usize::from(image.width) * cell[0], raster[1] * cell[1] / 2];
-            let grid = PixelGrid { place: image, size, cell, window };
-            return Self { pixels: Some(grid), ..self };
-        }
-        let [across, down] = [0, 1].map(|i| room[i] as f64 / window.size[i] as f64);
-        let scale = across.min(down);
-        let scale = if scale < 1.0 { scale } else { scale.floor() };
-        let size = window.size.map(|n| ((n as f64 * scale).round() as usize).max(1));
+        let (scale, window) = match zoom {
+            Some(zoom) => {
+                let scale = f64::from(zoom.steps).exp2() * cell[0] as f64;
+                (scale, zoom.part(room.map(|px| px as f64 / scale), film))
+            }
+            None => {
+                let [across, down] = [0, 1].map(|i| room[i] as f64 / window.size[i] as f64);
+                let scale = across.min(down);
+                (if scale < 1.0 { scale } else { scale.floor() }, window)
+            }
+        };
+        let size = [0, 1]
+            .map(|i| ((window.size[i] as f64 * scale).round() as usize).clamp(1, room[i].max(1)));
         let [width, height] = [0, 1].map(|i| size[i].div_ceil(cell[i]));
         let place = centred(inside, [width, 2 * height]);
         let cells = [0, 1].map(|i| (size[i] / cell[i]).max(1));
@@ -231,15 +245,21 @@ impl Zoom {
     fn window(&self, inside: Rect, film: [u32; 2]) -> ([usize; 2], Window) {
         let scale = f64::from(self.steps).exp2();
         let room = [usize::from(inside.width), 2 * usize::from(inside.height)];
-        let film = film.map(|n| n as usize);
-        let size = [0, 1].map(|i| ((room[i] as f64 / scale) as usize).clamp(1, film[i].max(1)));
+        let window = self.part(room.map(|n| n as f64 / scale), film);
         let halves =
-            |i: usize| ((size[i] as f64 * scale).round() as usize).clamp(1, room[i].max(1));
+            |i: usize| ((window.size[i] as f64 * scale).round() as usize).clamp(1, room[i].max(1));
+        ([halves(0), halves(1)], window)
+    }
+
+    /// Returns the window of the film of at most `room` pixels.
+    fn part(&self, room: [f64; 2], film: [u32; 2]) -> Window {
+        let film = film.map(|n| n as usize);
+        let size = [0, 1].map(|i| (room[i] as usize).clamp(1, film[i].max(1)));
         let origin = [0, 1].map(|i| {
             let start = (self.center[i] - 0.5 * size[i] as f64).round().max(0.0) as usize;
             start.min(film[i].saturating_sub(size[i]))
         });
-        ([halves(0), halves(1)], Window { origin, size })
+        Window { origin, size }
     }
 }
 

@@ -73,7 +73,7 @@ impl Model {
             LoupeMode::On => true,
             LoupeMode::Off => false,
         };
-        let is_fine = layout.pixels.is_some() || 2 * layout.raster[0] >= layout.window.size[0];
+        let is_fine = layout.pixels.is_some() || 2 * layout.texels[0] >= layout.window.size[0];
         let is_hidden = matches!(self.overlay, Some(Overlay::ViewerImage(_)));
         if !is_wanted || is_fine || is_hidden || self.channel != DisplayChannel::Beauty {
             return None;

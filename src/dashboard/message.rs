@@ -1,10 +1,11 @@
 //! Messages that `update` receives, and effects that it returns.
 
 use crate::dashboard::SceneSource;
+use crate::dashboard::pictures::KeptPicture;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo_render::film::{Display, LinearImage};
+use zerkalo_render::film::Display;
 use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{Snapshot, View, WatchReport};
 use zerkalo_scene::{SaveError, Scene, SceneErrors};
@@ -25,8 +26,8 @@ pub enum Message {
     Snapshot(Box<Snapshot>),
     /// State of the files that `zerkalo watch` shows.
     Watched(Box<WatchReport>),
-    /// Result of [`Effect::Pin`]: the picture and its mean number of samples per pixel.
-    Pinned(Arc<LinearImage>, f64),
+    /// Result of [`Effect::Pin`].
+    Pinned(KeptPicture),
     /// Result of [`Effect::Save`]: the scene, and the path of the written file or the error.
     Saved(Arc<Scene>, Result<PathBuf, SaveError>),
     /// Result of [`Effect::Load`].
@@ -98,15 +99,17 @@ pub struct Exported {
 pub enum Format {
     /// Picture as displayed, 8 bits per channel.
     Png,
-    /// Picture in linear radiance.
+    /// Picture in linear radiance, with channels of replicates, light groups and counts.
     Exr,
+    /// Picture in linear radiance.
+    PlainExr,
 }
 
 impl Format {
     pub fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",
-            Self::Exr => "exr",
+            Self::Exr | Self::PlainExr => "exr",
         }
     }
 }
@@ -131,6 +134,10 @@ pub enum DisplayChannel {
     Pinned,
     /// Live picture minus the pinned one, in false colour.
     Difference,
+    /// Pinned picture on the left, live one on the right.
+    SideBySide,
+    /// Pinned picture to the left of a border, live one to the right.
+    Wipe,
 }
 
 impl DisplayChannel {
@@ -140,6 +147,15 @@ impl DisplayChannel {
 
     /// Channels that need a film but no scene.
     pub const OF_FILM: [Self; 3] = [Self::Beauty, Self::Noise, Self::Samples];
+
+    /// Comparisons of the live picture, in the order in which a key cycles through them.
+    pub const COMPARISONS: [Self; 4] =
+        [Self::Beauty, Self::Difference, Self::SideBySide, Self::Wipe];
+
+    /// Returns `true` if it shows the pinned picture.
+    pub fn compares(self) -> bool {
+        matches!(self, Self::Pinned | Self::Difference | Self::SideBySide | Self::Wipe)
+    }
 
     pub fn name(self) -> &'static str {
         match self {
@@ -151,6 +167,8 @@ impl DisplayChannel {
             Self::Depth => "depth",
             Self::Pinned => "pinned picture",
             Self::Difference => "live − pinned",
+            Self::SideBySide => "pinned and live",
+            Self::Wipe => "pinned | live",
         }
     }
 }
@@ -170,7 +188,12 @@ pub enum Effect {
     /// Discard all samples and restart rendering.
     Restart,
     /// Return the current picture as [`Message::Pinned`].
-    Pin,
+    Pin {
+        /// Label of the last undo step of its scene.
+        step: String,
+        /// `true` if the user keeps it.
+        is_pinned: bool,
+    },
     /// Write the scene to its file, or to `path`, which becomes the scene's file.
     Save {
         scene: Arc<Scene>,
@@ -216,6 +239,8 @@ pub enum Effect {
         /// Display transform for images in linear radiance.
         display: Display,
         screen: [u16; 2],
+        /// `true` if the terminal stores the file instead of showing it.
+        downloads: bool,
     },
     /// Copy this path to the clipboard through the terminal.
     Copy(PathBuf),

@@ -21,6 +21,7 @@ pub mod noise_targets;
 pub mod overlay;
 pub mod overlay_layout;
 pub mod panel_lines;
+pub mod pictures;
 pub mod run;
 pub mod scene_source;
 mod search;

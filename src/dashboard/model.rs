@@ -3,6 +3,7 @@
 use crate::dashboard::graphics::Graphics;
 use crate::dashboard::layout::Zoom;
 use crate::dashboard::loupe::Loupe;
+use crate::dashboard::pictures::{KeptPicture, Pictures};
 use crate::dashboard::{
     Convergence, DisplayChannel, Editor, Focus, KeyContext, ListCursor, OrphanedEdits, Overlay,
     SceneSource,
@@ -11,7 +12,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo_render::film::{Display, LinearImage, PixelProbe};
+use zerkalo_render::film::{Display, PixelProbe};
 use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{Snapshot, View, WatchReport};
 use zerkalo_scene::camera::Camera;
@@ -201,8 +202,9 @@ pub struct Model {
     /// Exposure and tone curve.
     pub display: Display,
     pub channel: DisplayChannel,
-    /// Pinned picture and its mean number of samples per pixel.
-    pub pinned: Option<(Arc<LinearImage>, f64)>,
+    pub pictures: Pictures,
+    /// `true` if a histogram replaces the convergence plot.
+    pub histogram: bool,
     /// Film pixel (column, row) of the pixel probe.
     pub probe: Option<[usize; 2]>,
     /// Latest snapshot of the session.
@@ -340,6 +342,12 @@ impl Model {
         } else if left.with_lens_of(now) == *now {
             self.set_view(seen.camera.with_lens_of(now));
         }
+    }
+
+    /// Returns the picture that is compared with the live one.
+    pub fn compared(&self) -> Option<&KeptPicture> {
+        let live = self.snapshot.as_ref().map_or(0, |snapshot| snapshot.report.generation);
+        self.pictures.compared(live)
     }
 
     /// Returns the parts of the scene that commands on the selection change.

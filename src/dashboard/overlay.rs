@@ -40,6 +40,8 @@ pub struct ViewedImage {
     pub image: Option<Arc<ViewerImage>>,
     /// Fraction that the terminal has received, 0..=1.
     pub sent: f64,
+    /// `true` if the terminal stores the file instead of showing it.
+    pub downloads: bool,
 }
 
 /// List of commands, kinds or values, from which the user picks one. A search filters it.

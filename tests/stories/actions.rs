@@ -352,7 +352,7 @@ fn picture_stories() -> Vec<Story> {
         story("zoom out", "Z Z X", |_, d| d.model.zoom.is_some_and(|zoom| zoom.steps == 1)),
         story("zoom fits: the whole picture", "Z Alt-0", |_, d| d.model.zoom.is_none()),
         story("loupe: automatic, always, never", "G", |_, d| d.notice() == "loupe: always"),
-        story("next graphics protocol of the picture", "Alt-#", |_, d| {
+        story("next graphics protocol or block characters of the picture", "Alt-#", |_, d| {
             d.notice().starts_with("graphics auto: cells")
         }),
         story("probe a pixel", "i", |_, d| {
@@ -368,18 +368,23 @@ fn picture_stories() -> Vec<Story> {
         story("view the last picture", "p o", |_, d| {
             d.asked(|e| matches!(e, Effect::ViewImage { .. }))
         }),
+        story("download the last picture", "p Y", |_, d| d.notice().contains("y copies the path")),
         story("probe down", "i Down", move |_, d| probe(d)[1] > 24),
         fine("probe left by one pixel", "i Shift-Left", [31, 24]),
         fine("probe right by one pixel", "i Shift-Right", [33, 24]),
         fine("probe up by one pixel", "i Shift-Up", [32, 23]),
         fine("probe down by one pixel", "i Shift-Down", [32, 25]),
-        story("pin this picture", "k", |_, d| d.model.pinned.is_some()),
+        story("pin this picture", "k", |_, d| d.model.compared().is_some()),
         story("flip between pinned and live", "k c", |_, d| {
             d.model.channel == DisplayChannel::Pinned
         }),
-        story("difference of pinned and live", "k C", |_, d| {
-            d.model.channel == DisplayChannel::Difference
+        story("difference of pinned and live, side by side, wipe", "k C C C Left", |_, d| {
+            d.model.channel == DisplayChannel::Wipe && d.model.pictures.border < 0.0
         }),
+        story("compare with an earlier picture", "k k j Down Enter", |_, d| {
+            d.model.channel == DisplayChannel::Pinned && d.model.pictures.chosen == Some(1)
+        }),
+        story("histogram or convergence", "Alt-h", |_, d| d.model.histogram),
         story("pause or resume", "Space", |_, d| d.model.paused),
         story("restart the picture", "R", |_, d| d.asked(|e| *e == Effect::Restart)),
         story("stop at …", "T Ctrl-u `spp 100, time 5` Enter", |_, d| {

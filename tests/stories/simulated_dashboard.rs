@@ -3,6 +3,7 @@
 
 use super::*;
 use zerkalo::dashboard::editor::Editor;
+use zerkalo::dashboard::pictures::KeptPicture;
 use zerkalo::dashboard::scene_source::{NEW, SceneSource};
 use zerkalo_render::film::LinearImage;
 
@@ -195,7 +196,7 @@ impl Desk {
                 advice: "`zerkalo room-1.zk` continues it".into(),
                 is_image: false,
             })),
-            Effect::Pin => {
+            Effect::Pin { step, is_pinned } => {
                 let header = Header {
                     width: 64,
                     height: 48,
@@ -204,7 +205,14 @@ impl Desk {
                     precision: "f32".into(),
                 };
                 let mix = LightWeights { weights: vec![[1.0; 3]] };
-                Message::Pinned(Arc::new(LinearImage::of_film(&Film::new(header), &mix)), 16.0)
+                Message::Pinned(KeptPicture {
+                    image: Arc::new(LinearImage::of_film(&Film::new(header), &mix)),
+                    spp: 16.0,
+                    noise_levels: None,
+                    generation: 1,
+                    step,
+                    is_pinned,
+                })
             }
             _ => return None,
         })

@@ -43,7 +43,7 @@ fn only_shows(effect: &Effect) -> bool {
         effect,
         Effect::Display(_)
             | Effect::View(_)
-            | Effect::Pin
+            | Effect::Pin { .. }
             | Effect::Export(_)
             | Effect::ViewImage { .. }
             | Effect::Copy(_)

@@ -1,5 +1,6 @@
 //! Executor of the effects that `update` returns.
 
+use crate::dashboard::pictures::KeptPicture;
 use crate::dashboard::run::DEFAULT_STOP;
 use crate::dashboard::run::exports::{Exporter, ResizedExport, image_viewer, paths};
 use crate::dashboard::run::files::{AutosaveJob, Files, Job};
@@ -84,7 +85,7 @@ impl EffectRunner {
             Effect::Display(display) => self.session.set_display(display),
             Effect::Stop(stop) => self.session.set_stop(stop),
             Effect::View(view) => self.session.set_view(view),
-            Effect::Pin => self.pin(),
+            Effect::Pin { step, is_pinned } => self.pin(step, is_pinned),
             Effect::Export(format) => {
                 self.export(move |exporter, picture| exporter.write(picture, format));
             }
@@ -95,9 +96,9 @@ impl EffectRunner {
                 });
             }
             Effect::Copy(path) => frames.copy(&paths::full(&path)),
-            Effect::ViewImage { path, display, screen } => {
+            Effect::ViewImage { path, display, screen, downloads } => {
                 let viewport = image_viewer::viewport(frames, screen);
-                image_viewer::prepare(path, display, viewport, self.results.clone());
+                image_viewer::prepare(path, display, (viewport, downloads), self.results.clone());
             }
             Effect::Save { scene, path, overwrite } => {
                 self.edit(|editing| editing.files.save(scene, path, overwrite));
@@ -151,12 +152,19 @@ impl EffectRunner {
         }
     }
 
-    fn pin(&self) {
+    fn pin(&self, step: String, is_pinned: bool) {
         let results = self.results.clone();
         self.session.submit(move |picture| {
             if let Some(picture) = picture {
-                let pinned = Arc::new(LinearImage::of_film(picture.film, picture.weights));
-                let _ = results.send(Message::Pinned(pinned, picture.report.spp.mean));
+                let report = picture.report;
+                let _ = results.send(Message::Pinned(KeptPicture {
+                    image: Arc::new(LinearImage::of_film(picture.film, picture.weights)),
+                    spp: report.spp.mean,
+                    noise_levels: report.noise.map(|noise| noise.rmse.levels),
+                    generation: report.generation,
+                    step,
+                    is_pinned,
+                }));
             }
         });
     }

@@ -135,7 +135,7 @@ impl FramePipeline {
     fn give_up(&mut self) {
         if let Some(upload) = self.upload.take().filter(ImageUpload::has_begun) {
             self.removal.extend(upload.removal());
-            if upload.image.transfer.is_sixel {
+            if upload.image.transfer.is_divisible {
                 self.diff = FrameDiff::default();
             }
         }

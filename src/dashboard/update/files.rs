@@ -1,6 +1,7 @@
 //! Undo, saving, reloading and quitting, and the results of saves, loads and exports.
 
 use crate::dashboard::model::{Tone, file_notice, first_line};
+use crate::dashboard::pictures::Pictures;
 use crate::dashboard::{
     Answer, Effect, Exported, OpenedScene, PickEntry, SceneSource, UpdateContext, short_name,
 };
@@ -10,6 +11,7 @@ use std::sync::Arc;
 use zerkalo_scene::edit::{Target, outline};
 use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{SaveError, Scene, SceneErrors};
+use zerkalo_terminal::stores_files;
 
 const KEEP_FILE: Answer = ('k', "keep the file on disk", |c| c.decline());
 const KEEP_EDITS: Answer = ('k', "keep my edits", |c| c.decline());
@@ -171,7 +173,7 @@ impl UpdateContext<'_> {
         };
         let file = &mut self.model.file;
         (file.name, file.path, file.is_new) = (name, path, is_new);
-        self.model.pinned = None;
+        self.model.pictures = Pictures::default();
         self.model.export_when_done = false;
         self.model.orphaned_edits = None;
         self.model.selection = Target::Camera;
@@ -280,8 +282,12 @@ impl UpdateContext<'_> {
         match result {
             Ok(Exported { path, description, advice, is_image }) => {
                 let later = if self.improves() { ", Alt-p: when converged" } else { "" };
-                let shown =
-                    if is_image { format!("o shows it{later}  ·  ") } else { String::new() };
+                let stores = stores_files(&self.model.graphics.terminal);
+                let stored = if stores { ", Y downloads it" } else { "" };
+                let shown = match is_image {
+                    true => format!("o shows it{stored}{later}  ·  "),
+                    false => String::new(),
+                };
                 let text = format!("{}  {description}  ·  {shown}{advice}", path.display());
                 if is_image {
                     self.model.last_export = Some(path);

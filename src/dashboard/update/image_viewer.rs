@@ -4,28 +4,50 @@ use crate::dashboard::{Effect, Overlay, UpdateContext, ViewedImage, short_name};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zerkalo_terminal::image::ViewerImage;
+use zerkalo_terminal::stores_files;
 
 impl UpdateContext<'_> {
     pub(super) fn view_last_export(&mut self) {
         match self.model.last_export.clone() {
-            Some(path) => self.view_image(path),
+            Some(path) => self.view_image(path, false),
             None => self.say("No picture was written yet · p writes one"),
         }
     }
 
-    fn view_image(&mut self, path: PathBuf) {
+    pub(super) fn download_last_export(&mut self) {
+        match self.model.last_export.clone() {
+            Some(path) if stores_files(&self.model.graphics.terminal) => {
+                self.view_image(path, true);
+            }
+            Some(_) => self.say("iTerm2 and WezTerm store files, this terminal does not · y copies the path for scp"),
+            None => self.say("No picture was written yet · p writes one"),
+        }
+    }
+
+    /// Records the progress of the upload. A download ends the viewer.
+    pub(super) fn image_sent(&mut self, sent: f64) {
+        let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay else { return };
+        viewed.sent = sent;
+        if viewed.downloads && sent >= 1.0 {
+            let name = short_name(&viewed.path);
+            self.close_viewer();
+            self.say(format!("{name} is on the machine of your terminal"));
+        }
+    }
+
+    fn view_image(&mut self, path: PathBuf, downloads: bool) {
         let (display, screen) = (self.model.display, self.model.screen);
-        self.emit(Effect::ViewImage { path: path.clone(), display, screen });
+        self.emit(Effect::ViewImage { path: path.clone(), display, screen, downloads });
         self.model.drag = None;
         self.model.overlay =
-            Some(Overlay::ViewerImage(ViewedImage { path, image: None, sent: 0.0 }));
+            Some(Overlay::ViewerImage(ViewedImage { path, image: None, sent: 0.0, downloads }));
         self.repaint();
     }
 
     /// Requests the viewed image for the new screen size.
     pub(super) fn refit_image(&mut self) {
         if let Some(Overlay::ViewerImage(viewed)) = &self.model.overlay {
-            self.view_image(viewed.path.clone());
+            self.view_image(viewed.path.clone(), viewed.downloads);
         }
     }
 

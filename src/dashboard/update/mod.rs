@@ -121,10 +121,11 @@ impl UpdateContext<'_> {
                 self.model.snapshot = Some(snapshot);
                 self.model.refresh_loupe();
                 self.repaint();
+                self.keep_converged();
                 self.export_if_done();
             }
             Message::Watched(report) => self.watched(*report),
-            Message::Pinned(picture, spp) => self.pinned(picture, spp),
+            Message::Pinned(picture) => self.pinned(picture),
             Message::Saved(scene, result) => self.saved(scene, result),
             Message::Loaded(result) => self.loaded(*result),
             Message::ChangedOnDisk => self.changed_on_disk(),
@@ -144,11 +145,7 @@ impl UpdateContext<'_> {
                 (export, _) => *export = None,
             },
             Message::ViewerImage(path, result) => self.image_ready(&path, result),
-            Message::ImageSent(sent) => {
-                if let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay {
-                    viewed.sent = sent;
-                }
-            }
+            Message::ImageSent(sent) => self.image_sent(sent),
             Message::ConnectionRate(rate) => self.model.connection_rate = rate,
             Message::Terminal(terminal) => self.set_graphics(*terminal),
             Message::Tick => {}
@@ -171,6 +168,7 @@ impl UpdateContext<'_> {
 
     /// Requests a render of the scene in the present view.
     fn show(&mut self) {
+        self.keep_replaced();
         self.model.follow_edits();
         let scene = Arc::clone(self.model.seen());
         if self.model.display.tone != scene.film.tone {

@@ -216,6 +216,7 @@ impl UpdateContext<'_> {
             (Mode::Move, upright) => self.move_by_hand(right, down, upright),
             (Mode::Rotate, false) => self.rotate_selection(right * 2.0),
             (Mode::Fly, false) => self.look_by_hand(right, down),
+            (Mode::Orbit, false) if self.wipe_to(mouse.column) => {}
             (Mode::Orbit, _) if self.drag_zoomed(right, down) => {}
             (Mode::Orbit, false) => self.orbit_by_hand(right, down),
             (_, true) => self.pan_by_hand(right, down),
@@ -264,6 +265,13 @@ impl UpdateContext<'_> {
             let label = self.model.selection.label(self.scene());
             self.say(label);
         }
+    }
+
+    /// Moves the border of a wipe to a column of the screen. Returns `false` if there is none.
+    fn wipe_to(&mut self, column: u16) -> bool {
+        let Some(image) = self.model.layout().map(|layout| layout.image) else { return false };
+        let cells = f64::from(column) + 0.5 - f64::from(image.x);
+        self.wipe(|_| cells / f64::from(image.width.max(1)))
     }
 
     /// Returns the pixel of the film (column, row) under the mouse.

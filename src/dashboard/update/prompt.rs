@@ -115,7 +115,7 @@ impl UpdateContext<'_> {
         }
         let [width, height] = self.scene().film.size;
         let text = format!("{}x{} png", 2 * width, 2 * height);
-        let help = "Width x height in pixels, then png or exr. Rendered to the same target.";
+        let help = "Width x height in pixels, then png, exr, or exr rgb (no layers). Rendered to the same target.";
         self.prompt("render at another size", help, text, |c, text| c.export_sized(text));
     }
 
@@ -167,10 +167,16 @@ impl UpdateContext<'_> {
     fn export_sized(&mut self, text: &str) -> Result<(), String> {
         let mut words = text.split_whitespace();
         let size = words.next().ok_or("A size is needed, such as 1920x1080.")?;
-        let format = match words.next() {
-            None | Some("png") => Format::Png,
-            Some("exr") => Format::Exr,
-            Some(other) => return Err(format!("\"{}\" is neither png nor exr.", truncated(other))),
+        let format = match (words.next(), words.clone().next()) {
+            (Some("exr"), Some("rgb")) => {
+                words.next();
+                Format::PlainExr
+            }
+            (None | Some("png"), _) => Format::Png,
+            (Some("exr"), _) => Format::Exr,
+            (Some(other), _) => {
+                return Err(format!("\"{}\" is neither png nor exr.", truncated(other)));
+            }
         };
         if let Some(more) = words.next() {
             return Err(format!("Unexpected \"{}\".", truncated(more)));

@@ -56,8 +56,11 @@ impl UpdateContext<'_> {
         self.say("zoom: the whole picture");
     }
 
-    /// Orbits the camera, or pans the picture if it is zoomed.
+    /// Orbits the camera, pans the picture if it is zoomed, or moves the border of a wipe.
     pub(super) fn orbit_or_pan(&mut self, direction: Direction) {
+        if direction[0] != 0.0 && self.wipe(|border| border + direction[0] / 32.0) {
+            return;
+        }
         match (self.model.zoom, self.model.layout()) {
             (Some(_), Some(Layout { window, .. })) => {
                 let [right, up, _] = direction;
@@ -141,7 +144,7 @@ impl UpdateContext<'_> {
         });
         let is_viewer = matches!(self.model.overlay, Some(Overlay::ViewerImage(_)));
         let view = View {
-            raster: Some([0, 1].map(|i| layout.raster[i].min(layout.window.size[i]))),
+            raster: Some([0, 1].map(|i| layout.texels[i].min(layout.window.size[i]))),
             window: Some(layout.window),
             detail: pixels.or(loupe).or(self.model.requested.detail.filter(|_| is_viewer)),
             probe: self.model.probe,

@@ -59,10 +59,10 @@ fn title(model: &Model) -> String {
 fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
     let name = model.channel.name();
-    match (model.channel, &model.pinned) {
+    match (model.channel, model.compared()) {
         (DisplayChannel::Beauty, _) => {}
-        (DisplayChannel::Pinned, Some((_, spp))) => {
-            chips.push((format!("{name}, {spp:.0} spp"), true));
+        (channel, Some(picture)) if channel.compares() => {
+            chips.push((format!("{name} · {}", picture.description()), true));
         }
         _ => chips.push((name.to_string(), true)),
     }

@@ -52,6 +52,10 @@ fn description(viewed: &ViewedImage, image: &ViewerImage) -> (String, &'static s
         [w, h] => format!("{w}×{h} of {whole}"),
     };
     match image.protocol {
+        Protocol::Blocks if viewed.downloads => {
+            let kilobytes = image.transfer.bytes.len() as f64 * 1e-3;
+            (format!("to your machine: {:.0} % of {kilobytes:.0} KB", 100.0 * viewed.sent), "")
+        }
         Protocol::Blocks => (size, "  ·  zerkalo doctor lists the requirements of sharp images"),
         _ if viewed.sent < 1.0 => {
             let kilobytes = image.transfer.bytes.len() as f64 * 1e-3;

@@ -4,6 +4,7 @@ pub mod false_color;
 mod fields;
 mod frame;
 mod ground_grid;
+mod histogram;
 mod image_viewer;
 mod legend;
 mod loupe;
@@ -30,7 +31,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::style::Style;
 use theme::Theme;
-use zerkalo_terminal::cells::{Colors, picture_cells};
+use zerkalo_terminal::cells::{Blocks, Colors, mosaic_cells, picture_cells};
 
 #[derive(Debug, Default)]
 pub struct View {
@@ -44,26 +45,36 @@ pub struct View {
     pub uncovered: Vec<bool>,
 }
 
-/// Key of the cache: picture version, columns and rows of half cells, and set of colours.
+/// Key of the cache: picture version, columns and rows of texels, and set of colours.
 type Version = (u64, [usize; 2], Colors);
 
 impl View {
     /// Returns the cells of the picture for the area in `layout`.
     pub fn picture(&mut self, model: &Model, layout: &Layout) -> &Buffer {
-        let version = (model.picture_version, layout.raster, model.colors);
+        let version = (model.picture_version, layout.texels, model.colors);
         if self.made_for != Some(version) {
             let settled = picture::is_settled(model);
             let raster = match model.is_empty() {
-                true => Some(ground_grid::raster(model.scene(), layout.raster)),
+                true => Some(ground_grid::raster(model.scene(), layout.texels)),
                 false => self.imager.raster(model, layout),
             };
             let raster = raster.unwrap_or_default();
             let is_negative = model.on_light && model.colors == Colors::Mono;
             let raster = if is_negative { raster.negative() } else { raster };
-            self.picture = picture_cells(&raster, model.colors, settled);
+            self.picture = match model.graphics.blocks(model.colors) {
+                Blocks::Halves => picture_cells(&raster, model.colors, settled),
+                fine => mosaic_cells(&raster, fine),
+            };
             self.made_for = Some(version);
         }
         &self.picture
+    }
+
+    fn plot(&self, model: &Model, layout: &Layout, painter: &mut Painter) {
+        match (layout.plot, &self.imager.histogram) {
+            (Some(area), Some(histogram)) if model.histogram => histogram.draw(area, painter),
+            _ => plot::draw(model, layout, painter),
+        }
     }
 
     /// Draws `model` into `buffer`, which must be empty and have the size of the screen. Returns
@@ -101,11 +112,11 @@ impl View {
         let mut cursor = None;
         if model.watch.is_some() {
             watch::draw(model, &layout, painter);
-            plot::draw(model, &layout, painter);
+            self.plot(model, &layout, painter);
         } else if !matches!(model.overlay, Some(Overlay::Form(_))) {
             outline::draw(model, &layout, painter);
             cursor = fields::inspector(model, &layout, painter);
-            plot::draw(model, &layout, painter);
+            self.plot(model, &layout, painter);
         }
         if model.overlay.is_some() {
             cursor = overlay::draw(model, painter);

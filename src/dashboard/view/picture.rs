@@ -1,25 +1,29 @@
 //! Conversion of snapshots to rasters, and drawing of the picture's cells.
 
 use crate::dashboard::view::false_color::{NO_HIT, Scale, difference, normal_color, object_color};
+use crate::dashboard::view::histogram::Histogram;
 use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::marks;
 use crate::dashboard::{DisplayChannel, Layout, Model, Overlay};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
+use std::cmp::Ordering;
 use std::sync::Arc;
 use zerkalo_render::film::{Display, LinearImage, TILE, Window};
 use zerkalo_render::session::{Snapshot, State};
 use zerkalo_terminal::cells::Raster;
 use zerkalo_world::FirstHit;
 
-/// Columns and rows of half cells, and the window of the film that they show.
+/// Columns and rows of texels, and the window of the film that they show.
 type Place = ([usize; 2], Window);
 
-/// Converter of the model to rasters, images of half cells.
+/// Converter of the model to rasters, images in the texels of cells.
 #[derive(Debug, Default)]
 pub struct PictureView {
     /// Legend of the last raster; `None` if it needs none.
     pub legend: Option<Legend>,
+    /// Histogram of the last raster if it is visible.
+    pub histogram: Option<Histogram>,
     pinned: Option<PinnedCache>,
 }
 
@@ -44,11 +48,14 @@ pub fn is_settled(model: &Model) -> bool {
 }
 
 impl PictureView {
-    /// Returns the selected channel in the half cells of `layout`, with the outline of the selection. Returns
+    /// Returns the selected channel in the texels of `layout`, with the outline of the selection. Returns
     /// `None` if the channel's data are missing.
     pub fn raster(&mut self, model: &Model, layout: &Layout) -> Option<Raster> {
-        let size = (layout.raster, layout.window);
+        let size = (layout.texels, layout.window);
         let mut raster = self.channel(model, size)?;
+        let snapshot = model.snapshot.as_deref().filter(|_| model.histogram);
+        let live = snapshot.and_then(|snapshot| beauty(model, snapshot, size));
+        self.histogram = live.map(|live| Histogram::of(&live));
         let white_if = |inside: bool| [if inside { 255 } else { 0 }; 3];
         let mask = |s| hit_colors(s, size, |hit| white_if(marks::is_selected(model, hit)));
         if let Some(mask) = model.snapshot.as_deref().filter(|_| model.shows_marks()).and_then(mask)
@@ -58,7 +65,7 @@ impl PictureView {
         Some(raster)
     }
 
-    /// Returns the selected channel in `size` half cells, or `None` if its data are missing.
+    /// Returns the selected channel in `size`, or `None` if its data are missing.
     fn channel(&mut self, model: &Model, size: Place) -> Option<Raster> {
         self.legend = None;
         let snapshot = model.snapshot.as_deref()?;
@@ -84,6 +91,21 @@ impl PictureView {
             }
             DisplayChannel::Pinned => self.pinned(model, size),
             DisplayChannel::Difference => self.difference(model, snapshot, size),
+            DisplayChannel::SideBySide => {
+                let [live, pinned] = [beauty(model, snapshot, size)?, self.pinned(model, size)?];
+                Some(side_by_side(&pinned, &live))
+            }
+            DisplayChannel::Wipe => {
+                let [live, pinned] = [beauty(model, snapshot, size)?, self.pinned(model, size)?];
+                let [width, height] = size.0;
+                let border = ((0.5 + model.pictures.border) * width as f64) as usize;
+                let border = border.min(width.saturating_sub(1));
+                Some(Raster::from_fn(width, height, |i| match (i % width).cmp(&border) {
+                    Ordering::Less => pinned.pixels[i],
+                    Ordering::Equal => [255; 3],
+                    Ordering::Greater => live.pixels[i],
+                }))
+            }
         }
     }
 
@@ -116,7 +138,7 @@ impl PictureView {
     }
 
     fn pinned(&mut self, model: &Model, size: Place) -> Option<Raster> {
-        let (picture, _) = model.pinned.as_ref()?;
+        let picture = &model.compared()?.image;
         let same =
             |cached: &PinnedCache| Arc::ptr_eq(&cached.picture, picture) && cached.size == size;
         if !self.pinned.as_ref().is_some_and(same) {
@@ -162,6 +184,23 @@ impl PictureView {
 fn round_up(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
     [1.0, 2.0, 5.0].into_iter().map(|m| m * decade).find(|v| *v >= value).unwrap_or(10.0 * decade)
+}
+
+/// Returns two pictures beside each other in half their size.
+fn side_by_side(left: &Raster, right: &Raster) -> Raster {
+    let (width, height) = (left.width, left.height);
+    let half = [(width / 2).max(1), height / 2];
+    Raster::from_fn(width, height, |i| {
+        let (x, y) = (i % width, (i / width).wrapping_sub((height - half[1]) / 2));
+        if y >= half[1] || x / half[0] > 1 {
+            return [0; 3];
+        }
+        let picture = if x < half[0] { left } else { right };
+        let first = 2 * y * width + x % half[0] * 2;
+        let four =
+            [0, 1, width, width + 1].map(|n| picture.pixels[(first + n).min(width * height - 1)]);
+        [0, 1, 2].map(|c| (four.iter().map(|rgb| u32::from(rgb[c])).sum::<u32>() / 4) as u8)
+    })
 }
 
 /// Returns the latest picture, with the present weights of the light groups.

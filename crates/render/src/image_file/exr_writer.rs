@@ -37,10 +37,20 @@ pub(super) fn encode(
     bands: &mut dyn Bands,
     sink: &mut dyn WriteSeek,
 ) -> io::Result<()> {
-    encode_to(picture, bands, sink).map_err(|error| match error {
-        Error::Io(error) => error,
-        other => io::Error::other(other.to_string()),
-    })
+    let layers = layer_names(&picture.group_names, picture.weights.weights.len());
+    encode_to(picture, channels(&layers), bands, sink)
+}
+
+/// Writes a picture as [`encode`] does, with the channels `R G B` only.
+pub(super) fn encode_without_layers(
+    picture: &FilmFileHeader,
+    _: Depth,
+    bands: &mut dyn Bands,
+    sink: &mut dyn WriteSeek,
+) -> io::Result<()> {
+    let mut channels = channels(&[]);
+    channels.retain(|(_, source)| matches!(source, Source::Mixed(Replicates::Both, _)));
+    encode_to(picture, channels, bands, sink)
 }
 
 /// Source of a channel's values. The last field of a variant is the colour (0 red, 1 green, 2
@@ -57,11 +67,23 @@ enum Source {
 
 fn encode_to(
     picture: &FilmFileHeader,
+    channels: Vec<(String, Source)>,
+    bands: &mut dyn Bands,
+    sink: &mut dyn WriteSeek,
+) -> io::Result<()> {
+    try_encode(picture, &channels, bands, sink).map_err(|error| match error {
+        Error::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    })
+}
+
+fn try_encode(
+    picture: &FilmFileHeader,
+    channels: &[(String, Source)],
     bands: &mut dyn Bands,
     sink: &mut dyn WriteSeek,
 ) -> Result<(), Error> {
-    let channels = channels(&layer_names(&picture.group_names, picture.weights.weights.len()));
-    let headers = headers(picture, &channels, &picture.metadata);
+    let headers = headers(picture, channels, &picture.metadata);
     exr::block::write(&mut *sink, headers, true, |meta, writer| {
         let mut bytes = vec![Vec::new(); channels.len()];
         let mut compressor = writer.sequential_blocks_compressor(&meta);
@@ -70,7 +92,7 @@ fn encode_to(
             if left == 0 {
                 bytes.iter_mut().for_each(Vec::clear);
                 let rows = top..top + block.pixel_size.height();
-                encode_rows(picture, &channels, rows, bands, &mut bytes)?;
+                encode_rows(picture, channels, rows, bands, &mut bytes)?;
             }
             let descriptions = &meta.headers[0].channels;
             let block = UncompressedBlock::from_lines(descriptions, block, |line| {
@@ -85,7 +107,7 @@ fn encode_to(
     })?;
     let last = bands.final_metadata();
     let [before, after] = [&picture.metadata, last.as_ref().unwrap_or(&picture.metadata)]
-        .map(|metadata| header(picture, &channels, metadata));
+        .map(|metadata| header(picture, channels, metadata));
     Ok(replace_start(sink, &before?, &after?)?)
 }
 

@@ -42,10 +42,12 @@ struct Format {
     encode: fn(&FilmFileHeader, Depth, &mut dyn Bands, &mut dyn WriteSeek) -> io::Result<()>,
 }
 
-/// Formats of the picture files that can be written.
-static FORMATS: [Format; 2] = [
+/// Formats of the picture files that can be written. The last one is only chosen by
+/// [`ImageOutput::without_layers`].
+static FORMATS: [Format; 3] = [
     Format { extension: "png", encode: png_writer::encode },
     Format { extension: "exr", encode: exr_writer::encode },
+    Format { extension: "exr", encode: exr_writer::encode_without_layers },
 ];
 
 /// Path of a picture file to be written, with a known extension.
@@ -77,7 +79,7 @@ impl ImageOutput {
             "" => "its name has no extension that names the picture format".to_string(),
             extension => format!("no picture format has the extension .{extension}"),
         };
-        let known = FORMATS.iter().map(|format| format!(".{}", format.extension));
+        let known = FORMATS[..2].iter().map(|format| format!(".{}", format.extension));
         let remedy = format!("known extensions: {}", known.collect::<Vec<_>>().join(", "));
         Err(WriteError::new(&path, ErrorKind::InvalidFilename, what, &remedy))
     }
@@ -85,6 +87,14 @@ impl ImageOutput {
     /// Returns `true` if the format stores linear radiance.
     pub fn is_linear(&self) -> bool {
         FORMATS[self.format].extension == "exr"
+    }
+
+    /// Leaves out all channels of an EXR file except those of the picture.
+    pub fn without_layers(mut self) -> Self {
+        if self.is_linear() {
+            self.format = FORMATS.len() - 1;
+        }
+        self
     }
 
     /// Checks, before a long render, that the file can be written.

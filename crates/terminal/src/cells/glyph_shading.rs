@@ -71,7 +71,7 @@ static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
 
 /// Mean colours of [`CELLS`], in the same order.
 static SHADED: LazyLock<QuantisedPalette> =
-    LazyLock::new(|| QuantisedPalette::new(CELLS.iter().map(|cell| cell.halves()[0]).collect()));
+    LazyLock::new(|| QuantisedPalette::new(CELLS.iter().map(|cell| cell.quarters()[0]).collect()));
 
 /// The 16 ANSI colours.
 static BARE: LazyLock<QuantisedPalette> = LazyLock::new(|| {
@@ -173,7 +173,7 @@ mod tests {
             let rgb = [i / 64, i / 8 % 8, i % 8].map(|c| (c * 36) as u8);
             let target = Oklab::of(rgb);
             bare += Oklab::of(xterm_rgb(nearest(rgb))).distance(target);
-            shaded += pair(rgb, rgb).halves()[0].distance(target);
+            shaded += pair(rgb, rgb).quarters()[0].distance(target);
         }
         assert!(shaded < 0.6 * bare, "{shaded} of {bare}");
     }

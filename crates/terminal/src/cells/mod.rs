@@ -3,9 +3,12 @@
 
 mod dither;
 mod glyph_shading;
+mod mosaic;
 mod oklab;
 mod palette_quantisation;
 
+pub(crate) use mosaic::shape;
+pub use mosaic::{Blocks, mosaic_cells};
 pub use oklab::{Oklab, level, linear};
 pub use palette_quantisation::nearest_xterm;
 use palette_quantisation::{vivid, xterm_rgb};
@@ -42,12 +45,11 @@ impl Colors {
     }
 }
 
-/// Image of square pixels. A cell shows two of them, one above the other.
+/// Image in the pixels of cells. In half blocks they are squares, and a cell shows two of them, one
+/// above the other.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Raster {
-    /// Pixels in a row, one per cell.
     pub width: usize,
-    /// Rows of pixels, two per row of cells.
     pub height: usize,
     /// Pixels in 8-bit sRGB, row by row.
     pub pixels: Vec<[u8; 3]>,
@@ -80,36 +82,35 @@ pub struct PictureCell {
 }
 
 impl PictureCell {
-    /// Returns the mean colours of the upper and the lower half. Default colours are those of a
-    /// dark terminal; indexed colours are xterm's.
-    pub fn halves(&self) -> [Oklab; 2] {
+    /// Returns the mean linear light of the upper left, upper right, lower left and lower right
+    /// quarter. Default colours are those of a dark terminal; indexed colours are xterm's.
+    pub fn light(&self) -> [[f32; 3]; 4] {
         let rgb = |color, plain| match color {
             Color::Rgb(r, g, b) => [r, g, b],
             Color::Indexed(index) => xterm_rgb(index),
             _ => plain,
         };
-        let (fg, bg) = (rgb(self.fg, PLAIN_FG), rgb(self.bg, PLAIN_BG));
-        match self.glyph {
-            '▀' => [Oklab::of(fg), Oklab::of(bg)],
-            '▄' => [Oklab::of(bg), Oklab::of(fg)],
-            glyph => [glyph_shading::mixture(fg, bg, glyph_shading::coverage(glyph)); 2],
-        }
+        let (fg, bg) = (linear(rgb(self.fg, PLAIN_FG)), linear(rgb(self.bg, PLAIN_BG)));
+        let coverage = || [glyph_shading::coverage(self.glyph); 4];
+        let shares = mosaic::shape(self.glyph).map_or_else(coverage, |shape| shape.quarters);
+        shares.map(|share| [0, 1, 2].map(|c| share * fg[c] + (1.0 - share) * bg[c]))
     }
 
-    /// Returns the colours of the upper and the lower half. Returns `None` if a half has several
-    /// colours, or one that is not 24-bit.
-    pub fn colors(&self) -> Option<[[u8; 3]; 2]> {
-        let halves = match self.glyph {
-            '▀' => [self.fg, self.bg],
-            '▄' => [self.bg, self.fg],
-            ' ' => [self.bg; 2],
-            '█' => [self.fg; 2],
-            _ => return None,
+    /// Returns the mean colours of the quarters.
+    pub fn quarters(&self) -> [Oklab; 4] {
+        let [upper, right, lower, last] = self.light();
+        let both = |left, right| match left == right {
+            true => [Oklab::of_linear(left); 2],
+            false => [left, right].map(Oklab::of_linear),
         };
-        match halves {
-            [Color::Rgb(r, g, b), Color::Rgb(r2, g2, b2)] => Some([[r, g, b], [r2, g2, b2]]),
-            _ => None,
-        }
+        let [[a, b], [c, d]] = [both(upper, right), both(lower, last)];
+        [a, b, c, d]
+    }
+
+    /// Returns `true` if all visible colours are 24-bit.
+    pub fn is_24_bit(&self) -> bool {
+        let is_rgb = |color| matches!(color, Color::Rgb(..));
+        is_rgb(self.bg) && (self.glyph == ' ' || is_rgb(self.fg))
     }
 }
 

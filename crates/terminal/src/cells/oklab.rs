@@ -44,15 +44,30 @@ impl Oklab {
     }
 
     /// Converts linear sRGB to OKLab.
-    pub fn of_linear([r, g, b]: [f32; 3]) -> Self {
-        let l = (0.412_221_47 * r + 0.536_332_54 * g + 0.051_445_993 * b).cbrt();
-        let m = (0.211_903_5 * r + 0.680_699_5 * g + 0.107_396_96 * b).cbrt();
-        let s = (0.088_302_46 * r + 0.281_718_84 * g + 0.629_978_7 * b).cbrt();
+    pub fn of_linear(rgb: [f32; 3]) -> Self {
+        Self::of_linear_by(rgb, f32::cbrt)
+    }
+
+    fn of_linear_by([r, g, b]: [f32; 3], cube_root: impl Fn(f32) -> f32) -> Self {
+        let l = cube_root(0.412_221_47 * r + 0.536_332_54 * g + 0.051_445_993 * b);
+        let m = cube_root(0.211_903_5 * r + 0.680_699_5 * g + 0.107_396_96 * b);
+        let s = cube_root(0.088_302_46 * r + 0.281_718_84 * g + 0.629_978_7 * b);
         Self {
             l: 0.210_454_26 * l + 0.793_617_8 * m - 0.004_072_047 * s,
             a: 1.977_998_5 * l - 2.428_592_2 * m + 0.450_593_7 * s,
             b: 0.025_904_037 * l + 0.782_771_77 * m - 0.808_675_77 * s,
         }
+    }
+
+    /// Converts 8-bit sRGB with an error of at most 3e-5, several times as fast as [`Self::of`].
+    pub(crate) fn nearly(rgb: [u8; 3]) -> Self {
+        let cube_root = |x: f32| {
+            // A third of the exponent, and a step of Halley's method.
+            let y = f32::from_bits(x.to_bits() / 3 + 0x2a51_37a0);
+            let cube = y * y * y;
+            y * (cube + 2.0 * x) / (2.0 * cube + x)
+        };
+        Self::of_linear_by(linear(rgb), cube_root)
     }
 
     /// Returns the Euclidean distance. It is 1 between black and white; about 0.02 is just visible

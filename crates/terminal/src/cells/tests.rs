@@ -89,7 +89,7 @@ fn mean_error(colors: Colors, settled: bool) -> f32 {
     let mut sum = 0.0;
     for (i, rgb) in raster.pixels.iter().enumerate() {
         let cell = &cells[((i % width) as u16, (i / width / 2) as u16)];
-        sum += PictureCell::from(cell).halves()[i / width % 2].distance(Oklab::of(*rgb));
+        sum += PictureCell::from(cell).quarters()[i / width % 2 * 2].distance(Oklab::of(*rgb));
     }
     sum / raster.pixels.len() as f32
 }
@@ -112,20 +112,28 @@ fn error_of_fewer_colors_is_bounded() {
 #[test]
 #[ignore = "a measurement"]
 fn picture_conversion_time() {
-    let (width, height) = (160, 90);
+    let (width, height) = (160, 180);
+    let convert = |name: &str, convert: &dyn Fn(&Raster) -> Buffer, grid: [usize; 2]| {
+        let (width, height) = (width * grid[0], height * grid[1] / 2);
+        let mut best = f64::INFINITY;
+        for seed in 0..20 {
+            let raster = Raster::from_fn(width, height, |i| {
+                let noise = (i.wrapping_mul(2_654_435_761).wrapping_add(seed) >> 7) as u8 / 8;
+                [noise + (i % width) as u8, noise + (i / width) as u8, 100 + noise]
+            });
+            let start = std::time::Instant::now();
+            std::hint::black_box(convert(&raster));
+            best = best.min(start.elapsed().as_secs_f64());
+        }
+        println!("{name}: {:.2} ms", 1e3 * best);
+    };
+    for blocks in Blocks::ALL {
+        convert(blocks.name(), &|raster| mosaic_cells(raster, blocks), blocks.grid());
+    }
     for colors in Colors::ALL {
         for settled in [false, true] {
-            let mut best = f64::INFINITY;
-            for seed in 0..20 {
-                let raster = Raster::from_fn(width, height, |i| {
-                    let noise = (i.wrapping_mul(2_654_435_761).wrapping_add(seed) >> 7) as u8 / 8;
-                    [noise + (i % width) as u8, noise + (i / width) as u8, 100 + noise]
-                });
-                let start = std::time::Instant::now();
-                std::hint::black_box(picture_cells(&raster, colors, settled));
-                best = best.min(start.elapsed().as_secs_f64());
-            }
-            println!("{colors:?} settled {settled}: {:.2} ms", 1e3 * best);
+            let name = format!("{colors:?} settled {settled}");
+            convert(&name, &|raster| picture_cells(raster, colors, settled), [1, 2]);
         }
     }
 }

@@ -1,7 +1,8 @@
-//! Encoding of cells in few bytes. Colours are sent only when they change. An upper half block
-//! looks like a lower half block with exchanged colours; the one that needs fewer changes is sent.
+//! Encoding of cells in few bytes. Colours are sent only when they change. A block character looks
+//! like its complement with exchanged colours; the one that needs fewer changes is sent.
 //! The cursor moves by the shortest sequence.
 
+use crate::cells::shape;
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};
 use std::io::Write;
@@ -91,29 +92,24 @@ impl Encoder {
         let symbol = cell.symbol();
         let pen = |fg, bg| Pen { fg, bg, modifier };
         let plain = (symbol, pen(fg, bg));
-        let halves = match symbol {
-            _ if modifier.intersects(LINES) => return plain,
-            " " => [bg, bg],
-            "█" => [fg, fg],
-            "▀" => [fg, bg],
-            "▄" => [bg, fg],
-            _ => return plain,
-        };
-        let [upper, lower] = halves;
-        let is_flat = upper == lower;
+        let shape = symbol.chars().next().and_then(shape);
+        let Some(shape) = shape.filter(|_| !modifier.intersects(LINES)) else { return plain };
+        let is_flat = fg == bg || symbol == " " || symbol == "█";
+        let color = if symbol == "█" { fg } else { bg };
         // The default colours of foreground and background are both `Color::Reset`, but look
         // different.
-        let is_explicit = upper != Color::Reset && lower != Color::Reset;
+        let is_explicit =
+            [fg, bg].iter().all(|c| *c != Color::Reset) || is_flat && color != Color::Reset;
         let candidates: &[(&str, Pen)] = match (is_explicit, is_flat) {
             // The full block of some fonts does not cover the edge of the cell.
-            (true, true) => &[(" ", pen(self.pen.fg, upper))],
-            (true, false) => &[("▀", pen(upper, lower)), ("▄", pen(lower, upper))],
+            (true, true) => &[(" ", pen(self.pen.fg, color))],
+            (true, false) => &[plain, (&shape.complement, pen(bg, fg))],
             (false, _) if symbol == " " => &[(" ", pen(self.pen.fg, bg))],
             (false, _) => &[plain],
         };
         let changes = |(symbol, pen): &(&str, Pen)| {
             let colors = usize::from(pen.fg != self.pen.fg) + usize::from(pen.bg != self.pen.bg);
-            // A change of colour needs up to 17 bytes, a glyph 1 to 3.
+            // A change of colour needs up to 17 bytes, a glyph 1 to 4.
             16 * colors + symbol.len()
         };
         candidates.iter().min_by_key(|candidate| changes(candidate)).copied().unwrap_or(plain)

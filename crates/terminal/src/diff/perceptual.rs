@@ -1,6 +1,6 @@
 //! Perceptual difference between the terminal and the target frame, in the cells of the picture.
 
-use crate::cells::{Oklab, PictureCell, level, linear};
+use crate::cells::{Oklab, PictureCell, level};
 use crate::diff::{TargetFrame, position};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
@@ -15,10 +15,10 @@ const UNKNOWN: f32 = 2.0;
 struct CellColors {
     /// Cell of the target frame; `None` where text covers the picture.
     target: Option<PictureCell>,
-    /// Colours of the halves of the target cell.
-    halves: [Oklab; 2],
-    /// Colours of the halves on the terminal; `None` if unknown.
-    shown: Option<[Oklab; 2]>,
+    /// Colours of the quarters of the target cell.
+    quarters: [Oklab; 4],
+    /// Colours of the quarters on the terminal; `None` if unknown.
+    shown: Option<[Oklab; 4]>,
     /// `true` if a difference may count as visible: from a comparison of all cells on, until the
     /// cell is sent exactly or its difference is invisible.
     counts: bool,
@@ -68,14 +68,14 @@ impl PerceptualDiff {
             let picture = PictureCell::from(cell);
             if cell_colors.target != Some(picture) {
                 cell_colors.target = Some(picture);
-                cell_colors.halves = picture.halves();
+                cell_colors.quarters = picture.quarters();
             }
             if *cell == shown[cell_position] {
-                (cell_colors.shown, cell_colors.counts) = (Some(cell_colors.halves), false);
+                (cell_colors.shown, cell_colors.counts) = (Some(cell_colors.quarters), false);
                 continue;
             }
             cell_colors.error =
-                cell_colors.shown.map_or(UNKNOWN, |shown| difference(shown, cell_colors.halves));
+                cell_colors.shown.map_or(UNKNOWN, |shown| difference(shown, cell_colors.quarters));
             cell_colors.counts &= cell_colors.error > threshold;
             cell_colors.visible = cell_colors.counts;
             // Cells with equal colours but different contents are sent last.
@@ -93,11 +93,14 @@ impl PerceptualDiff {
     /// Records that the terminal shows `cell`, which is the target cell if `exact` is `true`.
     pub fn sent(&mut self, index: usize, cell: &Cell, exact: bool) {
         let cell_colors = &mut self.cells[index];
-        let shown = PictureCell::from(cell).halves();
+        let shown = PictureCell::from(cell).quarters();
         cell_colors.shown = Some(shown);
         (cell_colors.counts, cell_colors.visible) = (!exact, !exact);
-        cell_colors.error =
-            if exact { 0.0 } else { difference(shown, cell_colors.halves).max(f32::MIN_POSITIVE) };
+        cell_colors.error = if exact {
+            0.0
+        } else {
+            difference(shown, cell_colors.quarters).max(f32::MIN_POSITIVE)
+        };
     }
 
     /// Returns `(difference, index)` of each cell with a visible difference.
@@ -117,13 +120,15 @@ impl PerceptualDiff {
     pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let block = |index: usize| (index % width / side, index / width / (side / 2));
-        let colors = |cell_colors: &CellColors| cell_colors.target.and_then(|cell| cell.colors());
-        // Sums in linear light, and numbers of half cells.
+        let light = |cell_colors: &CellColors| {
+            cell_colors.target.filter(PictureCell::is_24_bit).map(|cell| cell.light())
+        };
+        // Sums in linear light, and numbers of quarters of cells.
         let mut blocks: HashMap<_, ([f32; 3], f32)> = HashMap::new();
         for (index, cell_colors) in self.cells.iter().enumerate() {
-            for half in colors(cell_colors).into_iter().flatten().map(linear) {
+            for quarter in light(cell_colors).into_iter().flatten() {
                 let (sum, count) = blocks.entry(block(index)).or_default();
-                (0..3).for_each(|c| sum[c] += half[c]);
+                (0..3).for_each(|c| sum[c] += quarter[c]);
                 *count += 1.0;
             }
         }
@@ -131,13 +136,13 @@ impl PerceptualDiff {
         let mut improved = Vec::new();
         for (index, cell_colors) in self.cells.iter().enumerate() {
             let mut cell = target.cells[position(self.area, index)].clone();
-            if cell_colors.visible && colors(cell_colors).is_some() {
+            if cell_colors.visible && light(cell_colors).is_some() {
                 let (sum, count) = blocks[&block(index)];
                 let [r, g, b] = sum.map(|sum| level(sum / count));
-                let halves = [Oklab::of([r, g, b]); 2];
+                let quarters = [Oklab::of([r, g, b]); 4];
                 cell = Cell::new(" ");
                 cell.set_bg(Color::Rgb(r, g, b));
-                let gain = cell_colors.error - difference(halves, cell_colors.halves);
+                let gain = cell_colors.error - difference(quarters, cell_colors.quarters);
                 if gain > 0.0 {
                     improved.push((gain, index));
                 }
@@ -153,9 +158,10 @@ impl PerceptualDiff {
     }
 }
 
-/// Returns the larger of the distances between upper and between lower halves.
-fn difference(a: [Oklab; 2], b: [Oklab; 2]) -> f32 {
-    a[0].distance(b[0]).max(a[1].distance(b[1]))
+/// Returns the largest of the distances between quarters.
+fn difference(a: [Oklab; 4], b: [Oklab; 4]) -> f32 {
+    let squares = (0..4).map(|i| a[i].distance_squared(b[i]));
+    squares.fold(0.0, f32::max).sqrt()
 }
 
 #[cfg(test)]

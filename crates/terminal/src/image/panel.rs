@@ -1,7 +1,7 @@
 //! Choice of the protocol that shows a picture in a panel while it changes.
 
 use super::Protocol;
-use crate::cells::Colors;
+use crate::cells::{Blocks, Colors};
 use crate::{Capabilities, Multiplexer};
 
 /// Choice of the user.
@@ -12,16 +12,19 @@ pub enum GraphicsMode {
     Automatic,
     Kitty,
     Sixel,
-    Cells,
+    Cells(Blocks),
 }
 
 impl GraphicsMode {
     /// All modes with their names, in the order in which a key cycles through them.
-    pub const NAMED: [(&'static str, Self); 4] = [
+    pub const NAMED: [(&'static str, Self); 7] = [
         ("auto", Self::Automatic),
         ("kitty", Self::Kitty),
         ("sixel", Self::Sixel),
-        ("cells", Self::Cells),
+        ("cells", Self::Cells(Blocks::Halves)),
+        ("quadrants", Self::Cells(Blocks::Quadrants)),
+        ("sextants", Self::Cells(Blocks::Sextants)),
+        ("octants", Self::Cells(Blocks::Octants)),
     ];
 }
 
@@ -50,7 +53,7 @@ impl Protocol {
         let best = Self::of(terminal);
         let sixel = Self::of(&Capabilities { kitty_graphics: false, ..terminal.clone() });
         match mode {
-            GraphicsMode::Cells => (Self::Blocks, "as chosen"),
+            GraphicsMode::Cells(_) => (Self::Blocks, "as chosen"),
             _ if terminal.cell_px.is_none() => {
                 (Self::Blocks, "as the terminal does not report the size of its cells")
             }
@@ -101,7 +104,7 @@ mod tests {
         assert_eq!(of(&kitty, GraphicsMode::Automatic), Protocol::Kitty);
         assert_eq!(of(&kitty, GraphicsMode::Sixel), Protocol::Blocks);
         assert_eq!(of(&xterm, GraphicsMode::Automatic), Protocol::Sixel(256));
-        assert_eq!(of(&xterm, GraphicsMode::Cells), Protocol::Blocks);
+        assert_eq!(of(&xterm, GraphicsMode::Cells(Blocks::Octants)), Protocol::Blocks);
         let flawed = terminal("WezTerm 20240203", true, true);
         assert_eq!(of(&flawed, GraphicsMode::Automatic), Protocol::Blocks);
         assert_eq!(of(&flawed, GraphicsMode::Kitty), Protocol::Kitty);

@@ -20,7 +20,7 @@ pub fn transfer(
     cell_height: usize,
     colors: u16,
 ) -> Result<Transfer, String> {
-    let mut transfer = Transfer { is_sixel: true, ..Transfer::default() };
+    let mut transfer = Transfer { is_divisible: true, ..Transfer::default() };
     let rows = place.height.div_ceil(MAX_STRIPS).max(1);
     let width = image.width;
     let strips = image.pixels.chunks(width.max(1) * cell_height * usize::from(rows));

@@ -69,7 +69,7 @@ impl TileImage {
         match self.protocol {
             Protocol::Blocks => {}
             Protocol::Sixel(colors) => {
-                transfer.is_sixel = true;
+                transfer.is_divisible = true;
                 let bytes = sixel::encoded(&image.pixels, image.width, [x, y], colors)?;
                 transfer.add(bytes.as_bytes());
             }

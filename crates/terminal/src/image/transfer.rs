@@ -10,9 +10,10 @@ pub struct Transfer {
     /// Offsets between escape sequences, ascending, at which other output may be sent. The last is
     /// the length of `bytes`.
     pub stops: Vec<usize>,
-    /// `true` for sixel. Its sequences may be divided at any byte and ended early by ST (string
-    /// terminator). The image overwrites its cells, which must be drawn again after its removal.
-    pub is_sixel: bool,
+    /// `true` for sixel and files. Their sequences may be divided at any byte and ended early by ST
+    /// (string terminator). A sixel image overwrites its cells, which must be drawn again after its
+    /// removal.
+    pub is_divisible: bool,
     /// Bytes that remove the image, even if only a part of it was sent.
     pub remove: Vec<u8>,
 }
@@ -22,15 +23,15 @@ impl Transfer {
     /// if the range ends inside an escape sequence. The rest of this sequence, or ST, must then be
     /// sent before any other output.
     ///
-    /// If not even one sequence fits, a sixel sequence is cut; a sequence of kitty's protocol is
+    /// If not even one sequence fits, a divisible sequence is cut; a sequence of kitty's protocol is
     /// returned whole.
     pub fn slice(&self, sent: usize, room: usize) -> (Range<usize>, bool) {
-        let room = room.max(usize::from(self.is_sixel));
+        let room = room.max(usize::from(self.is_divisible));
         let later_stops = &self.stops[self.stops.partition_point(|stop| *stop <= sent)..];
         let fitting = later_stops.partition_point(|stop| *stop <= sent.saturating_add(room));
         match (fitting, later_stops.first()) {
             (_, None) => (sent..sent, false),
-            (0, Some(stop)) if !self.is_sixel => (sent..*stop, false),
+            (0, Some(stop)) if !self.is_divisible => (sent..*stop, false),
             (0, Some(_)) => (sent..sent + room, true),
             (fitting, _) => (sent..later_stops[fitting - 1], false),
         }
@@ -52,7 +53,7 @@ mod tests {
     #[test]
     fn slices_are_contiguous_and_complete() {
         for divisible in [false, true] {
-            let mut transfer = Transfer { is_sixel: divisible, ..Transfer::default() };
+            let mut transfer = Transfer { is_divisible: divisible, ..Transfer::default() };
             for length in [1, 7, 30, 2, 2, 100, 1] {
                 transfer.add(&vec![length as u8; length]);
             }

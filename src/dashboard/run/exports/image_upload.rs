@@ -65,7 +65,7 @@ impl ImageUpload {
     /// Returns an escape sequence that removes the image at any progress of its upload, and clears
     /// the screen if the image has overwritten cells.
     pub fn any_removal(&self) -> Vec<u8> {
-        let clear: &[u8] = if self.image.transfer.is_sixel { b"\x1b[2J" } else { b"" };
+        let clear: &[u8] = if self.image.transfer.is_divisible { b"\x1b[2J" } else { b"" };
         [END, &self.image.transfer.remove, clear].concat()
     }
 }

@@ -3,6 +3,7 @@
 use crate::dashboard::Message;
 use crate::dashboard::run::frames::FramePipeline;
 use crossbeam_channel::Sender;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
@@ -11,7 +12,7 @@ use zerkalo_render::film::{Display, box_means};
 use zerkalo_render::image_file::{ReadPicture, png_of_rgb, read_exr, read_png};
 use zerkalo_terminal::cells::{Raster, level, linear};
 use zerkalo_terminal::image::{ImageViewport, Protocol, ViewerImage};
-use zerkalo_terminal::{Capabilities, cell_px};
+use zerkalo_terminal::{Capabilities, cell_px, file_transfer};
 
 /// Longest time for sending an image, which is downscaled if the connection is slow.
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
@@ -30,16 +31,38 @@ pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
 
 /// Reads and encodes the image at `path` in a separate thread, which sends a
 /// [`Message::ViewerImage`] to `results`.
-pub fn prepare(path: PathBuf, display: Display, viewport: ImageViewport, results: Sender<Message>) {
+pub fn prepare(
+    path: PathBuf,
+    display: Display,
+    (viewport, downloads): (ImageViewport, bool),
+    results: Sender<Message>,
+) {
     let (requested, failed) = (path.clone(), results.clone());
     let started = thread::Builder::new().name("image viewer".into()).spawn(move || {
-        let image = viewer_image(&path, &display, &viewport).map(Arc::new);
+        let image = match downloads {
+            true => download(&path, &display, viewport),
+            false => viewer_image(&path, &display, &viewport),
+        };
+        let image = image.map(Arc::new);
         // Sending fails only at the end of the program, when the receiver is gone.
         let _ = results.send(Message::ViewerImage(path, image));
     });
     if let Err(error) = started {
         let _ = failed.send(Message::ViewerImage(requested, Err(error.to_string())));
     }
+}
+
+/// Reads the image at `path` and encodes the file for a terminal that stores it.
+fn download(
+    path: &Path,
+    display: &Display,
+    viewport: ImageViewport,
+) -> Result<ViewerImage, String> {
+    let viewport = ImageViewport { protocol: Protocol::Blocks, ..viewport };
+    let image = viewer_image(path, display, &viewport)?;
+    let contents = fs::read(path).map_err(|error| error.to_string())?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    Ok(ViewerImage { transfer: file_transfer(&name, &contents), ..image })
 }
 
 /// Reads, scales and encodes the image at `path`. `display` converts the linear light of an EXR

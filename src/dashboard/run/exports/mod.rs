@@ -43,6 +43,9 @@ impl Exporter {
         let write = |path: &Path| {
             let mut output = ImageOutput::from_path(path)?;
             output.existing = Existing::Refuse;
+            if format == Format::PlainExr {
+                output = output.without_layers();
+            }
             output.write(&header, Depth::Eight, &mut &*picture.film)
         };
         let stem = self.stem(header.source().unwrap_or_default());
