@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod checkpoints;
+mod config;
 mod cpu;
 mod doctor;
 mod edit;
@@ -26,7 +27,7 @@ pub use cpu::require as require_cpu;
 use crate::dashboard::scene_source::{BUILT_IN, SceneSource};
 use args::{Cli, Command};
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser};
+use clap::{CommandFactory, FromArgMatches};
 use load_progress::LoadReporter;
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -78,6 +79,7 @@ pub fn main() -> ExitCode {
         Some(Command::Info(args)) => info::run(args),
         Some(Command::New { file }) => new::run(file),
         Some(Command::Doctor) => doctor::run(),
+        Some(Command::Config) => config::run(),
         None => edit::run(&cli.edit),
     };
     let (status, message) = match result {
@@ -92,7 +94,12 @@ pub fn main() -> ExitCode {
 
 /// Parses the command line. Ends the program if it is not valid.
 fn parse_command_line() -> Cli {
-    Cli::try_parse().unwrap_or_else(|error| {
+    let mut command = config::command_line().unwrap_or_else(|error| {
+        warn(&error);
+        std::process::exit(1)
+    });
+    let parsed = command.try_get_matches_from_mut(std::env::args_os());
+    parsed.and_then(|matches| Cli::from_arg_matches(&matches)).unwrap_or_else(|error| {
         // In `zerkalo rendr a.toml`, clap takes `rendr` for a scene file and reports an error about
         // `a.toml`.
         let first = std::env::args_os().nth(1).unwrap_or_default();

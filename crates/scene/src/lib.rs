@@ -31,6 +31,7 @@ mod validate;
 
 pub use crate::format::TomlText;
 pub use crate::format::schema::FIELDS;
+pub use crate::format::suggest::did_you_mean;
 pub use crate::shape::{Rotate, Scale, TransformOp};
 pub use asset_resolver::AssetResolver;
 pub use diagnostic::{Diagnostic, SceneErrors};

@@ -50,7 +50,8 @@ impl PictureView {
         let size = (layout.raster, layout.window);
         let mut raster = self.channel(model, size)?;
         let white_if = |inside: bool| [if inside { 255 } else { 0 }; 3];
-        let mask = |s| hit_colors(s, size, |hit| white_if(marks::is_selected(model, hit)));
+        let is_selected = marks::is_selected(model);
+        let mask = |s| hit_colors(s, size, |hit| white_if(is_selected(hit)));
         if let Some(mask) = model.snapshot.as_deref().filter(|_| model.shows_marks()).and_then(mask)
         {
             marks::outline(&mut raster, &mask);

@@ -8,6 +8,6 @@ pub(crate) mod patch;
 pub(crate) mod read;
 pub(crate) mod schema;
 pub(crate) mod source_map;
-pub(crate) mod suggest;
+pub mod suggest;
 
 pub use read::TomlText;
