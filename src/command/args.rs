@@ -146,6 +146,8 @@ pub enum Command {
     },
     /// Report the capabilities of the terminal and of the connection, and how to improve them
     Doctor(JsonArgs),
+    /// Print options, keys and colours in force, as a configuration file
+    Config,
 }
 
 /// Arguments of `zerkalo render`.

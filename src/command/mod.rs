@@ -4,6 +4,7 @@ mod args;
 mod check;
 mod checkpoints;
 mod compare;
+mod config;
 mod cpu;
 mod doctor;
 mod edit;
@@ -28,7 +29,7 @@ pub use cpu::require as require_cpu;
 use crate::dashboard::scene_source::{BUILT_IN, SceneSource};
 use args::{Cli, Command};
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser};
+use clap::{CommandFactory, FromArgMatches};
 use load_progress::LoadReporter;
 use serde::Serialize;
 use std::ffi::OsString;
@@ -87,6 +88,7 @@ pub fn main() -> ExitCode {
         Some(Command::Scenes(args)) => scenes::run(args),
         Some(Command::New { file }) => new::run(file),
         Some(Command::Doctor(args)) => doctor::run(*args),
+        Some(Command::Config) => config::run(),
         None => edit::run(&cli.edit),
     };
     let (status, message) = match result {
@@ -101,7 +103,12 @@ pub fn main() -> ExitCode {
 
 /// Parses the command line. Ends the program if it is not valid.
 fn parse_command_line() -> Cli {
-    Cli::try_parse().unwrap_or_else(|error| {
+    let mut command = config::command_line().unwrap_or_else(|error| {
+        warn(&error);
+        std::process::exit(1)
+    });
+    let parsed = command.try_get_matches_from_mut(std::env::args_os());
+    parsed.and_then(|matches| Cli::from_arg_matches(&matches)).unwrap_or_else(|error| {
         // In `zerkalo rendr a.toml`, clap takes `rendr` for a scene file and reports an error about
         // `a.toml`.
         let first = std::env::args_os().nth(1).unwrap_or_default();

@@ -1,6 +1,6 @@
 //! Key hints in the last row of the screen, selected from the command table.
 
-use crate::dashboard::update::commands::{COMMANDS, Hint, HintLine};
+use crate::dashboard::update::commands::{Hint, HintLine, table};
 use crate::dashboard::{KeyContext, Model, Overlay, PanelLine};
 use zerkalo_scene::edit::Widget;
 
@@ -30,7 +30,7 @@ fn hint_line(model: &Model) -> Option<HintLine> {
 
 /// Returns the hints for the state `line`, sorted by position.
 fn hints_of(line: HintLine) -> Vec<&'static Hint> {
-    let mut hints: Vec<_> = COMMANDS
+    let mut hints: Vec<_> = table()
         .iter()
         .flat_map(|command| command.hints)
         .filter(|hint| hint.lines.contains(&line))
@@ -47,6 +47,7 @@ pub fn hints(model: &Model) -> Vec<&'static Hint> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dashboard::update::commands::COMMANDS;
 
     #[test]
     fn hint_belongs_to_command_with_key_in_context() {

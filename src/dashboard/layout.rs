@@ -151,8 +151,9 @@ impl Model {
         let scene = self.scene();
         let parts = [scene.objects.len(), scene.lights.len(), scene.materials.len()];
         let headings = 3 + parts.iter().filter(|n| **n > 0).count();
+        let unfolded: usize = self.unfolded.iter().map(|whole| whole.parts(scene).len()).sum();
         // Camera, ambient light, background, film and integrator.
-        let lines = 5 + headings + scene.cameras.len() + parts.iter().sum::<usize>();
+        let lines = 5 + headings + scene.cameras.len() + parts.iter().sum::<usize>() + unfolded;
         let needed = u16::try_from(lines + 2).unwrap_or(u16::MAX);
         let outline = match self.focus {
             _ if self.watch.is_some() => left,

@@ -38,7 +38,7 @@ impl Model {
     /// that has a place in the picture.
     pub fn shows_marks(&self) -> bool {
         let is_placed =
-            matches!(self.selection, Target::Object(_) | Target::Light(_) | Target::Material(_));
+            !matches!(self.selection, Target::Camera | Target::View(_) | Target::Settings(_));
         let is_at_work =
             self.marks_until.is_some() || matches!(self.mode, Mode::Move | Mode::Rotate);
         let is_picture = self.channel == DisplayChannel::Beauty && self.mode != Mode::Probe;

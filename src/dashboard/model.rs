@@ -184,9 +184,11 @@ pub struct Model {
     pub free_view: Option<FreeView>,
     /// Selected part of the scene, which always exists.
     pub selection: Target,
-    /// Objects and lights that are moved, rotated, duplicated and deleted together; if there are
-    /// none, the selection is.
-    pub marked: BTreeSet<Target>,
+    /// Parts that are moved, rotated, duplicated and deleted together, the first marked first; if
+    /// there are none, the selection is.
+    pub marked: Vec<Target>,
+    /// Compounds whose parts are listed in the outline.
+    pub unfolded: BTreeSet<Target>,
     /// `true` if a deletion has chosen the selection. It is not deleted before the user selects it.
     pub chosen_by_deletion: bool,
     pub focus: Focus,
@@ -350,12 +352,15 @@ impl Model {
         self.pictures.compared(live)
     }
 
-    /// Returns the parts of the scene that commands on the selection change.
+    /// Returns the parts of the scene that commands on the selection change, in the order of the
+    /// outline.
     pub fn targets(&self) -> Vec<Target> {
-        match self.marked.is_empty() {
-            true => vec![self.selection.clone()],
-            false => self.marked.iter().cloned().collect(),
+        if self.marked.is_empty() {
+            return vec![self.selection.clone()];
         }
+        let mut targets = self.marked.clone();
+        targets.sort_unstable();
+        targets
     }
 
     pub fn is_unsaved(&self) -> bool {

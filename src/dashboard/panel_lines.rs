@@ -3,6 +3,8 @@
 
 use crate::dashboard::search::has_words;
 use crate::dashboard::{FieldList, Form, Model, Overlay};
+use std::collections::BTreeSet;
+use std::iter::successors;
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Property, Target, Widget, outline as subjects, rows};
 use zerkalo_scene::value::truncated;
@@ -57,6 +59,10 @@ pub struct OutlineEntry {
     pub subject: Target,
     /// Name with control characters escaped.
     pub label: String,
+    /// Number of compounds that have the part.
+    pub depth: usize,
+    /// `true` if the parts of a compound are listed, `false` if they are folded; `None` for others.
+    pub unfolded: Option<bool>,
     /// Material of an object, `off` for a light that is off, or the key that recalls a stored
     /// camera.
     pub note: String,
@@ -130,11 +136,17 @@ const COMMON: [&str; 9] = [
     "emission",
 ];
 
-pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
+/// Returns the lines of the outline: all parts of the scene, and the parts of the compounds in
+/// `unfolded`.
+pub fn outline(scene: &Scene, unfolded: &BTreeSet<Target>) -> Vec<OutlineLine> {
     let mut lines = Vec::new();
     let mut last = None;
     let mut views = 0;
     for (section, subject) in subjects(scene) {
+        let compounds: Vec<_> = successors(subject.compound(), Target::compound).collect();
+        if !compounds.iter().all(|compound| unfolded.contains(compound)) {
+            continue;
+        }
         if last != Some(section) {
             lines.push(OutlineLine::Heading(section.title().to_string()));
             last = Some(section);
@@ -145,13 +157,28 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
                 if views <= 9 { format!("key {views}") } else { String::new() }
             }
             Target::Light(i) if !scene.lights[*i].on => "off".to_string(),
-            Target::Object(i) => truncated(&scene.objects[*i].material),
+            Target::Object(_) | Target::Part(..) => own_material(scene, &subject),
             _ => String::new(),
         };
         let label = subject.label(scene);
-        lines.push(OutlineLine::Entry(OutlineEntry { subject, label, note }));
+        let is_compound = !subject.parts(scene).is_empty();
+        let is_unfolded = is_compound.then(|| unfolded.contains(&subject));
+        lines.push(OutlineLine::Entry(OutlineEntry {
+            subject,
+            label,
+            depth: compounds.len(),
+            unfolded: is_unfolded,
+            note,
+        }));
     }
     lines
+}
+
+/// Returns the name of the material of an object or part; empty if it is that of its compound.
+fn own_material(scene: &Scene, subject: &Target) -> String {
+    let of = |target: &Target| target.material(scene).map(|material| material.label(scene));
+    let whole = subject.compound().and_then(|compound| of(&compound));
+    of(subject).filter(|own| whole.as_ref() != Some(own)).unwrap_or_default()
 }
 
 /// Returns the index of the line that selects `subject`.
@@ -257,6 +284,10 @@ fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
 }
 
 impl Model {
+    pub fn outline_lines(&self) -> Vec<OutlineLine> {
+        outline(self.scene(), &self.unfolded)
+    }
+
     /// Returns the lines of the open form, or of the inspector.
     pub fn field_lines(&self) -> Vec<PanelLine> {
         let lines = match &self.overlay {
@@ -300,7 +331,7 @@ mod tests {
         let mut scene = mirror_room();
         scene.cameras.insert("left".into(), scene.camera.clone());
         scene.lights[0].on = false;
-        let lines = outline(&scene);
+        let lines = outline(&scene, &BTreeSet::new());
         for (_, subject) in subjects(&scene) {
             assert!(outline_position(&lines, &subject).is_some(), "{subject:?}");
             let fields = inspector(&scene, &subject);

@@ -1,6 +1,7 @@
 //! Tests of the command line, which run the program as users and scripts do.
 
 mod checkpoints;
+mod config;
 mod hostile;
 mod memory;
 #[cfg(unix)]

@@ -15,7 +15,7 @@ type Act = (u8, usize, usize, f64);
 fn act() -> impl Strategy<Value = Act> {
     let amount =
         prop_oneof![prop::sample::select(vec![1.0, -1.0, 0.1, -0.1, 3.0, 0.0]), -90.0..90.0f64,];
-    (0..21u8, 0..1000usize, 0..1000usize, amount)
+    (0..24u8, 0..1000usize, 0..1000usize, amount)
 }
 
 const TEXTS: [&str; 12] =
@@ -71,6 +71,22 @@ fn perform(
         15 => ("store camera", edit::store_view(scene, (at % 2 == 0).then_some("left"))),
         16 => ("roughen", edit::step_mirror(scene, Some(&subject), "roughness", amount.trunc())),
         17 => ("reflect", edit::step_mirror(scene, Some(&subject), "reflection", amount.trunc())),
+        18 => {
+            let objects: Vec<_> = (0..scene.objects.len()).map(Target::Object).collect();
+            let [a, b] = [at, at + 1 + other].map(|n| pick(&objects, n).unwrap_or_default());
+            let kind = ["union", "intersection", "difference"][other % 3];
+            (
+                "join",
+                if a == b {
+                    edit::join(scene, &[], kind)
+                } else {
+                    edit::join(scene, &[a, b], kind)
+                },
+            )
+        }
+        19 => ("dissolve", edit::dissolve(scene, &subject)),
+        20 => ("add part", edit::add_part(scene, &subject, &edit::part_kinds()[other % 13].name)),
+        21 => ("scale", edit::scale(scene, &subject, amount.abs() * 0.1 + 0.5, glam::DVec3::ONE)),
         _ => ("next lobe", edit::step_mirror(scene, None, "lobe", amount)),
     }
 }
@@ -132,7 +148,8 @@ fn random_edits_leave_valid_scenes_and_can_be_undone() {
     // An operation missing in the tally would go untested.
     for name in
         "step|fine step|set|set number|toggle|add object|add light|move|rotate|drop|duplicate|\
-         delete|rename|own material|store camera|roughen|reflect|next lobe"
+         delete|rename|own material|store camera|roughen|reflect|next lobe|join|dissolve|\
+         add part|scale"
             .split('|')
     {
         assert!(tally.get(name).is_some_and(|[done, _]| *done > 0), "{name}: {tally:?}");

@@ -179,6 +179,17 @@ fn light_and_mirror_stories() -> Vec<Story> {
     ]
 }
 
+/// Returns keys that mark a copy of the ball, and the ball, before `keys`.
+fn joined(keys: &str) -> String {
+    format!("D Enter V / `object ball` Enter V {keys}")
+}
+
+/// Returns the kind of the selected object.
+fn whole(desk: &Desk) -> &'static str {
+    let Target::Object(i) = desk.model.selection else { return "" };
+    desk.scene().objects[i].shape.key()
+}
+
 fn object_stories() -> Vec<Story> {
     vec![
         story("add an object", "a Enter Enter", |_, d| {
@@ -189,6 +200,28 @@ fn object_stories() -> Vec<Story> {
         }),
         selected("duplicate the selection", BALL, "D", |_, d| {
             d.scene().objects.len() == 4 && d.model.selection != BALL
+        }),
+        selected("union of the marked objects", BALL, &joined("|"), |_, d| whole(d) == "union"),
+        selected("intersection of the marked objects", BALL, &joined("&"), |_, d| {
+            whole(d) == "intersection"
+        }),
+        selected("difference: the first marked without the others", BALL, &joined("_"), |_, d| {
+            whole(d) == "difference"
+        }),
+        selected(
+            "add a part to the compound",
+            BALL,
+            &joined("| Alt-a Enter Home Enter"),
+            |_, d| d.model.selection == Target::Part(2, vec![2]),
+        ),
+        selected("dissolve the compound into its parts", BALL, &joined("| B"), |_, d| {
+            d.scene().objects.len() == 4
+        }),
+        selected("scale the selection", BALL, "Alt-s `2` Enter", |_, d| {
+            d.scene().objects[1].transform.len() == 2
+        }),
+        selected("array of the selection", BALL, "Alt-d Enter", |_, d| {
+            d.scene().objects.len() == 6
         }),
         selected("delete the selection", BALL, "x", |_, d| {
             d.scene().objects.iter().all(|o| o.name != "ball")
@@ -254,6 +287,15 @@ fn panel_stories() -> Vec<Story> {
         selected("inspect, edit, confirm, choose", BALL, "Enter", |_, d| {
             d.model.focus == Focus::Inspector
         }),
+        selected("list the parts of a compound", BALL, &joined("| Tab Right Down"), |_, d| {
+            d.model.selection == Target::Part(2, vec![0])
+        }),
+        selected(
+            "hide the parts, select the whole",
+            BALL,
+            &joined("| Tab Right Down Left Left"),
+            |_, d| d.model.selection == Target::Object(2) && d.model.unfolded.is_empty(),
+        ),
         story("line below", "Tab Down", |_, d| d.model.selection == Target::View("v1".into())),
         story("line above", "Tab Down Down Up", |_, d| {
             d.model.selection == Target::View("v1".into())

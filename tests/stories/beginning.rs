@@ -4,7 +4,7 @@ use super::*;
 use zerkalo_scene::material::Preset;
 
 /// Number of keys that [`Desk::keys`] presses for `keys`.
-fn count(keys: &str) -> usize {
+pub fn count(keys: &str) -> usize {
     let parts = keys.split('`').enumerate();
     parts
         .map(|(i, part)| if i % 2 == 1 { part.len() } else { part.split_whitespace().count() })
@@ -78,4 +78,52 @@ fn form_of_a_mesh_begins_with_the_name_of_its_file() {
     assert!(desk.problem().is_some_and(|problem| problem.contains("no such file")));
     desk.keys("Esc Esc");
     assert_eq!(desk.text(), ROOM);
+}
+
+/// Returns the text of an OBJ file of a ball with 2,000 triangles between 170 and 180.
+fn ball_of_2000_triangles() -> String {
+    let (columns, rows) = (40, 26);
+    let mut text = String::new();
+    for (row, column) in (0..=rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+        let (up, around) =
+            (f64::from(row) / f64::from(rows), f64::from(column) / f64::from(columns));
+        let (sin, cos) = (std::f64::consts::PI * up).sin_cos();
+        let (x, z) = (std::f64::consts::TAU * around).sin_cos();
+        text += &format!(
+            "v {} {} {}\n",
+            175.0 + 5.0 * x * sin,
+            175.0 + 5.0 * cos,
+            175.0 + 5.0 * z * sin
+        );
+    }
+    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+        let at = |row: i32, column: i32| row * columns + column % columns + 1;
+        let [a, b] = [at(row, column), at(row, column + 1)];
+        let [c, d] = [at(row + 1, column + 1), at(row + 1, column)];
+        if row + 1 < rows {
+            text += &format!("f {a} {c} {d}\n");
+        }
+        if row > 0 {
+            text += &format!("f {a} {b} {c}\n");
+        }
+    }
+    text
+}
+
+#[test]
+fn mesh_before_a_rougher_mirror_is_compared_in_thirty_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("duck.obj");
+    std::fs::write(&path, ball_of_2000_triangles()).unwrap();
+    let mut desk = Desk::new(&ROOM.replace("roughness = 0.05", "roughness = 0.0"));
+    let keys = "a `mesh` Enter `duck.obj` Enter Home Enter / `rough` Enter k `.3` Enter C";
+    assert!(count(keys) <= 30, "{} keys", count(keys));
+    let (before, after) = keys.split_once("Home").unwrap();
+    desk.keys(&before.replace("duck.obj", path.to_str().unwrap()));
+    assert!(desk.notice().contains("2000 triangles, 10 x 10 x 10 units"), "{}", desk.notice());
+    desk.keys("Home").keys(after);
+    let ball = zerkalo_scene::edit::bounds(desk.scene(), &Target::Object(3)).unwrap();
+    assert!(ball.radius < 1.0 && ball.center.z > -2.0 && ball.center.z < 5.0, "{ball:?}");
+    assert_eq!(desk.scene().materials["mirror"].roughness, 0.3);
+    assert!(desk.model.compared().is_some() && desk.model.channel == DisplayChannel::Difference);
 }

@@ -3,6 +3,7 @@
 
 mod actions;
 mod beginning;
+mod compounds;
 mod editing;
 mod files;
 mod mouse;

@@ -2,7 +2,6 @@
 
 use super::*;
 use zerkalo::dashboard::layout::Focus;
-use zerkalo::dashboard::panel_lines::outline;
 
 /// Returns column and row of the cell at the centre of the picture, which shows the ball.
 fn middle(desk: &Desk) -> [u16; 2] {
@@ -114,7 +113,9 @@ fn click_selects_lines_of_outline_and_inspector() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Tab");
     let rows = desk.model.outline_rows().unwrap();
-    for (i, line) in outline(desk.scene()).into_iter().enumerate().take(usize::from(rows.height)) {
+    for (i, line) in
+        desk.model.outline_lines().into_iter().enumerate().take(usize::from(rows.height))
+    {
         if desk.model.outline_scroll > 0 {
             break;
         }

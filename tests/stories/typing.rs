@@ -193,3 +193,26 @@ fn scene_is_saved_from_every_widget() {
         assert_eq!(desk.scene().objects.len(), if keys.starts_with("a E") { 4 } else { 3 });
     }
 }
+
+#[test]
+fn marked_parts_are_scaled_about_their_foot_and_repeated() {
+    let mut desk = Desk::new(ROOM);
+    let center = |desk: &Desk, i: usize| {
+        zerkalo_scene::edit::bounds(desk.scene(), &Target::Object(i)).unwrap().center
+    };
+    desk.keys("/ `object ball` Enter V / `object glass` Enter V Alt-s `2` Enter");
+    assert!(center(&desk, 1).distance(DVec3::new(0.0, 2.0, 1.0)) < 1e-9, "{}", center(&desk, 1));
+    assert!(center(&desk, 2).distance(DVec3::new(0.0, 2.0, -3.0)) < 1e-9, "{}", center(&desk, 2));
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM);
+    desk.keys("/ `object ball` Enter Alt-d `2 x .75` Enter");
+    assert_eq!(desk.scene().objects.len(), 5, "{}", desk.notice());
+    for (copy, x) in [(3, 0.75), (4, 1.5)] {
+        assert!(center(&desk, copy).distance(DVec3::new(x, 1.0, 0.0)) < 1e-9);
+    }
+    desk.keys("u Alt-s `-1` Enter");
+    assert!(desk.problem().is_some_and(|problem| problem.contains("greater than 0")));
+    desk.keys("Esc Alt-d `99 x 1` Enter");
+    assert!(desk.problem().is_some_and(|problem| problem.contains("up to 50")));
+    assert_eq!(desk.text(), ROOM);
+}

@@ -3,6 +3,7 @@
 use crate::format::source_map::line_column;
 use crate::value::{sanitized, sort_by_number};
 use std::fmt;
+use std::path::Path;
 
 /// Error or warning about a scene file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -19,6 +20,15 @@ pub struct Diagnostic {
     pub help: String,
     /// Line of the scene file above a line with a caret below the column; empty without a location.
     pub excerpt: String,
+}
+
+impl Diagnostic {
+    /// Creates an error at a byte offset of `text`, the contents of the file `path`.
+    pub fn at(path: &Path, text: &str, offset: usize, found: String, help: String) -> Self {
+        let line_column = Some(line_column(text, offset));
+        let file = path.display().to_string();
+        Self { file, line_column, found, help, ..Self::default() }
+    }
 }
 
 /// Largest indentation of the second line of a printed diagnostic [characters].

@@ -141,7 +141,8 @@ fn values(scene: &Scene, subject: &Target) -> Option<String> {
         }
         Target::Settings(SceneSettings::Film | SceneSettings::Integrator)
         | Target::View(_)
-        | Target::Object(_) => return None,
+        | Target::Object(_)
+        | Target::Part(..) => return None,
     };
     Some(format!("{}: {state}", subject.label(scene)))
 }

@@ -6,6 +6,7 @@ use crate::dashboard::{
     DisplayChannel, Effect, Format, Mode, Model, Overlay, SceneSource, UpdateContext,
 };
 use HintLine as H;
+use std::sync::OnceLock;
 use zerkalo_terminal::event::Key;
 
 /// State that selects the hints in the hint line.
@@ -154,6 +155,11 @@ pub static COMMANDS: &[Command] = &[
 
     command("objects", "add an object", &[(Anywhere, "a")], |c| c.pick_object()).hints(&[hint(&[H::First, H::In(Picture)], 6, "a", "add")]),
     command("objects", "mark or unmark the selection", &[(Anywhere, "V")], |c| c.toggle_mark()).also("multi select several group").hints(&[hint(&[H::In(Outline)], 11, "V", "mark")]),
+    command("objects", "union of the marked objects", &[(Anywhere, "|")], |c| c.join("union")).also("compound boolean join csg"),
+    command("objects", "intersection of the marked objects", &[(Anywhere, "&")], |c| c.join("intersection")).also("compound boolean join csg"),
+    command("objects", "difference: the first marked without the others", &[(Anywhere, "_")], |c| c.join("difference")).also("compound boolean subtract cut csg"),
+    command("objects", "add a part to the compound", &[(Anywhere, "Alt-a")], |c| c.pick_part()).also("union"),
+    command("objects", "dissolve the compound into its parts", &[(Anywhere, "B")], |c| c.dissolve()).also("break explode"),
     command("objects", "duplicate the selection", &[(Anywhere, "D")], |c| c.duplicate()).hints(&[hint(&[H::In(Outline)], 4, "D", "duplicate")]),
     command("objects", "delete the selection", &[(Anywhere, "x Delete")], |c| c.delete()).hints(&[hint(&[H::In(Outline)], 10, "x", "delete")]),
     command("objects", "rename the selection", &[(Anywhere, "e F2")], |c| c.ask_name()).hints(&[hint(&[H::In(Outline)], 3, "e", "rename")]),
@@ -177,6 +183,8 @@ pub static COMMANDS: &[Command] = &[
     command("objects", "rotate left, fine", &[(Rotating, "Shift-Left")], |c| c.rotate_selection(-1.0)).hints(&[hint(&[H::In(Rotating)], 2, "Shift", "1°")]),
     command("objects", "rotate right, fine", &[(Rotating, "Shift-Right")], |c| c.rotate_selection(1.0)),
     command("objects", "rotate by a typed angle", &[(Rotating, "0 1 2 3 4 5 6 7 8 9 - .")], |c| c.ask_angle()).hints(&[hint(&[H::In(Rotating)], 3, "0-9", "type degrees")]),
+    command("objects", "scale the selection", &[(Anywhere, "Alt-s")], |c| c.ask_scale()).also("size larger smaller resize"),
+    command("objects", "array of the selection", &[(Anywhere, "Alt-d")], |c| c.ask_array()).also("copies duplicate repeat row"),
     command("objects", "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
     command("objects", "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
     command("objects", "make the selection gold, glass, …", &[(Anywhere, "S")], |c| c.pick_preset()),
@@ -190,7 +198,7 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::List, H::Form], 9, "Esc", "cancel"),
         hint(&[H::Typing, H::Number], 9, "Esc", "leave as it was"),
     ]),
-    command("panels", "inspect, edit, confirm, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).hints(&[
+    command("panels", "inspect, edit, confirm, choose", &[(Picture, "Enter"), (Outline, "Enter"), (Inspector, "Enter"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).hints(&[
         hint(&[H::In(Outline)], 2, "Enter", "inspect"),
         hint(&[H::In(Inspector)], 4, "Enter 0-9", "type"),
         hint(&[H::List], 2, "Enter", "take"),
@@ -198,6 +206,8 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::Typing, H::Number], 1, "Enter", "confirm"),
         hint(&[H::Number], 2, "*2 /2 +.1 -=.1", "change it"),
     ]),
+    command("panels", "list the parts of a compound", &[(Outline, "Right")], |c| c.unfold()).available(viewing_or_choosing).hints(&[hint(&[H::In(Outline)], 8, "Right Left", "parts")]),
+    command("panels", "hide the parts, select the whole", &[(Outline, "Left")], |c| c.fold()),
     command("panels", "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).available(always).hints(&[
         hint(&[H::In(Outline)], 1, "Up Down", "select"),
         hint(&[H::In(Inspector), H::Form], 1, "Up Down", "field"),
@@ -279,6 +289,41 @@ pub static COMMANDS: &[Command] = &[
     command("help", "keys that work here", &[(Anywhere, "? F1")], |c| c.open_help()).available(always).also("help manual").hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),
 ];
 
+/// Table with the keys of the user's configuration.
+static REBOUND: OnceLock<Vec<Command>> = OnceLock::new();
+
+/// Returns all commands with the keys in force.
+pub fn table() -> &'static [Command] {
+    REBOUND.get().map_or(COMMANDS, Vec::as_slice)
+}
+
+/// Gives commands other keys, once in a process: each by its index in [`COMMANDS`], in the first context
+/// of its keys, or anywhere. Other commands lose these keys there.
+pub fn rebind(changes: &[(usize, String)]) {
+    let mut commands = COMMANDS.to_vec();
+    for (index, names) in changes {
+        let context = COMMANDS[*index].keys.first().map_or(Anywhere, |(context, _)| *context);
+        let names: &'static str = names.clone().leak();
+        for (other, command) in commands.iter_mut().enumerate() {
+            let mut keys = command.keys.to_vec();
+            if other == *index {
+                keys.retain(|(place, _)| *place != context);
+                keys.insert(0, (context, names));
+                let hints = command.hints.iter().map(|hint| Hint { keys: names, ..*hint });
+                command.hints = hints.collect::<Vec<_>>().leak();
+            } else {
+                let is_free = |name: &&str| !names.split(' ').any(|taken| taken == *name);
+                for (_, own) in keys.iter_mut().filter(|(place, _)| *place == context) {
+                    *own = own.split(' ').filter(is_free).collect::<Vec<_>>().join(" ").leak();
+                }
+            }
+            keys.retain(|(_, names)| !names.is_empty());
+            command.keys = keys.leak();
+        }
+    }
+    let _ = REBOUND.set(commands);
+}
+
 impl Command {
     const fn available(self, available: fn(&Model) -> bool) -> Self {
         Self { available, ..self }
@@ -321,7 +366,7 @@ pub fn lookup(context: KeyContext, key: Key) -> Option<&'static Command> {
         *context == wanted && names.split(' ').any(|known| known == name)
     };
     let command_in = |context| {
-        COMMANDS.iter().find(|command| command.keys.iter().any(|keys| has_key(keys, context)))
+        table().iter().find(|command| command.keys.iter().any(|keys| has_key(keys, context)))
     };
     context.chain().find_map(command_in)
 }

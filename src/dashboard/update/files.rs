@@ -41,8 +41,8 @@ impl UpdateContext<'_> {
         let old: HashSet<_> = outline(before).iter().map(|(_, part)| part.title(before)).collect();
         let scene = Arc::clone(self.scene());
         let parts = outline(&scene).into_iter().map(|(_, part)| part);
-        let grown = scene.objects.len() + scene.lights.len() + scene.materials.len()
-            > before.objects.len() + before.lights.len() + before.materials.len();
+        let grown = scene.objects.len() > before.objects.len()
+            || outline(&scene).len() > outline(before).len();
         let new = parts.into_iter().find(|part| !old.contains(&part.title(&scene)));
         if let Some(part) = new.filter(|_| grown) {
             self.select(part);

@@ -18,6 +18,16 @@ impl UpdateContext<'_> {
         });
     }
 
+    pub(super) fn pick_part(&mut self) {
+        let edit = edit::add_part(self.scene(), &self.model.selection, "sphere");
+        if let Err(refusal) = edit {
+            return self.refuse(&refusal.to_string());
+        }
+        self.open_pick("add a part", edit::part_kinds(), 0, |c, name| {
+            c.open_form(name, edit::add_part(c.scene(), &c.model.selection, name));
+        });
+    }
+
     pub(super) fn pick_light(&mut self) {
         let entries = [edit::light_kinds(), edit::ready_lights()].concat();
         self.open_pick("add a light", entries, 0, |c, name| {

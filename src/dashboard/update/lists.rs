@@ -1,6 +1,6 @@
 //! Commands that move the cursor and open the entry under it, in panels and overlays.
 
-use crate::dashboard::panel_lines::{outline, outline_position, walked};
+use crate::dashboard::panel_lines::{outline_position, walked};
 use crate::dashboard::search::{rank, words};
 use crate::dashboard::{
     Answer, Editor, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
@@ -35,11 +35,32 @@ impl UpdateContext<'_> {
     }
 
     fn move_outline_cursor(&mut self, steps: isize) {
-        let lines = outline(self.scene());
+        let lines = self.model.outline_lines();
         let position = outline_position(&lines, &self.model.selection).unwrap_or(0);
         if let Some(entry) = lines.get(walked(&lines, position, steps)).and_then(OutlineLine::entry)
         {
             self.select(entry.subject.clone());
+        }
+    }
+
+    /// Lists the parts of the selected compound, or else opens the inspector.
+    pub(super) fn unfold(&mut self) {
+        let subject = self.model.selection.clone();
+        let folded =
+            !subject.parts(self.scene()).is_empty() && !self.model.unfolded.contains(&subject);
+        match folded {
+            true => drop(self.model.unfolded.insert(subject)),
+            false => self.open(),
+        }
+    }
+
+    /// Hides the parts of the selected compound, or selects the compound of the selected part.
+    pub(super) fn fold(&mut self) {
+        let subject = self.model.selection.clone();
+        if !self.model.unfolded.remove(&subject)
+            && let Some(compound) = subject.compound()
+        {
+            self.select(compound);
         }
     }
 

@@ -21,10 +21,11 @@ mod watch;
 mod zoom;
 
 use crate::dashboard::model::{Notice, Tone, file_notice};
-use crate::dashboard::panel_lines::{outline, outline_position, scrolled, walked};
+use crate::dashboard::panel_lines::{outline_position, scrolled, walked};
 use crate::dashboard::{Effect, FieldList, Message, Model, Overlay};
 use files::capital;
 use ratatui::layout::Rect;
+use std::iter::successors;
 use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
@@ -258,6 +259,7 @@ impl UpdateContext<'_> {
 
     fn select(&mut self, subject: Target) {
         self.model.chosen_by_deletion = false;
+        self.model.unfolded.extend(successors(subject.compound(), Target::compound));
         if self.model.selection != subject {
             self.model.selection = subject;
             self.model.inspector = FieldList::default();
@@ -294,7 +296,9 @@ impl UpdateContext<'_> {
         if !self.model.selection.exists(self.model.scene()) {
             let last = |len: usize, of: fn(usize) -> Target| len.checked_sub(1).map(of);
             let scene = self.model.scene();
-            let near = match self.model.selection {
+            let near = match &self.model.selection {
+                part @ Target::Part(..) => successors(part.compound(), Target::compound)
+                    .find(|compound| compound.exists(scene)),
                 Target::Object(_) => last(scene.objects.len(), Target::Object),
                 Target::Light(_) => last(scene.lights.len(), Target::Light),
                 _ => None,
@@ -327,7 +331,7 @@ impl UpdateContext<'_> {
         *cursor = walked(&lines, *cursor, 0);
         *scroll = scrolled(*scroll, Some(*cursor).filter(|_| follow), lines.len(), rows);
         let Some(rows) = self.model.outline_rows().filter(|_| !self.in_form()) else { return };
-        let lines = outline(self.model.scene());
+        let lines = self.model.outline_lines();
         let line = outline_position(&lines, &self.model.selection).filter(|_| follow);
         let scroll = &mut self.model.outline_scroll;
         *scroll = scrolled(*scroll, line, lines.len(), rows.height.into());

@@ -1,7 +1,6 @@
 //! Mouse: clicks select or focus, drags orbit or move, the wheel dollies or scrolls.
 
 use crate::dashboard::marks::LightMark;
-use crate::dashboard::panel_lines::outline;
 use crate::dashboard::{
     Drag, FieldList, Focus, Layout, Mode, OutlineLine, Overlay, PanelLine, UpdateContext,
 };
@@ -9,7 +8,7 @@ use glam::DVec3;
 use ratatui::layout::Rect;
 use zerkalo_kernel::primitive::BoundingSphere;
 use zerkalo_scene::Scene;
-use zerkalo_scene::edit::{SceneSettings, Target, Widget, bounds};
+use zerkalo_scene::edit::{SceneSettings, Target, Widget, bounds, solid_at};
 use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
 /// Number of lines that a list scrolls per tick of the wheel.
@@ -101,19 +100,46 @@ impl UpdateContext<'_> {
             self.select(Target::Light(mark.light));
             return true;
         }
-        let Target::Object(selected) = self.model.selection else { return false };
         let eye = DVec3::from_array(self.seen().camera.eye);
         let fills = |ball: BoundingSphere| ball.center.distance(eye) <= 2.0 * ball.radius;
         let hit = self.pixel_at(mouse).and_then(|pixel| first_hit(self.seen(), pixel));
-        hit.is_some_and(|(object, _)| object == selected)
+        hit.is_some_and(|hit| self.is_on_selection(hit))
             && !bounds(self.scene(), &self.model.selection).is_none_or(fills)
+    }
+
+    /// Returns `true` if the first hit of a ray is on the selected object or part.
+    fn is_on_selection(&self, (object, point): (usize, DVec3)) -> bool {
+        let eye = DVec3::from_array(self.seen().camera.eye);
+        let selection = &self.model.selection;
+        match selection {
+            Target::Object(selected) => *selected == object,
+            Target::Part(selected, _) if *selected == object => {
+                let solid = solid_at(self.seen(), object, eye, point);
+                solid.is_some_and(|solid| selection.solids(self.seen()).contains(&solid))
+            }
+            _ => false,
+        }
+    }
+
+    /// Returns what a click on an object selects: the object or, if it is selected already, the part
+    /// at `point`.
+    fn clicked(&self, (object, point): (usize, DVec3)) -> Target {
+        let eye = DVec3::from_array(self.seen().camera.eye);
+        let solid = match self.model.selection {
+            Target::Object(i) | Target::Part(i, _) if i == object => {
+                solid_at(self.seen(), object, eye, point)
+            }
+            _ => None,
+        };
+        let new = solid.filter(|solid| *solid != self.model.selection);
+        new.unwrap_or(Target::Object(object))
     }
 
     /// Selects the part of the scene on the clicked line. If the outline has the focus and the part
     /// is selected already, opens the inspector.
     fn press_in_outline(&mut self, rows: Rect, mouse: Mouse) {
         // The line is looked up first, because a change of focus may change the layout.
-        let lines = outline(self.scene());
+        let lines = self.model.outline_lines();
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
         let subject = line.and_then(OutlineLine::entry).map(|entry| entry.subject.clone());
         let again =
@@ -128,8 +154,15 @@ impl UpdateContext<'_> {
                 self.select(subject);
                 self.toggle_mark();
             }
-            Some(_) if again => self.set_focus(Focus::Inspector),
-            Some(subject) => self.select(subject),
+            Some(subject) => {
+                self.select(subject);
+                match line.and_then(OutlineLine::entry).and_then(|entry| entry.unfolded) {
+                    Some(true) if again => self.fold(),
+                    Some(false) => self.unfold(),
+                    _ if again => self.set_focus(Focus::Inspector),
+                    _ => {}
+                }
+            }
             None => {}
         }
     }
@@ -255,9 +288,8 @@ impl UpdateContext<'_> {
                 return self.focus_on_pixel(pixel);
             }
             let hit = first_hit(self.seen(), pixel);
-            let seen = hit.map_or(Target::Settings(SceneSettings::Background), |(object, _)| {
-                Target::Object(object)
-            });
+            let background = Target::Settings(SceneSettings::Background);
+            let seen = hit.map_or(background, |hit| self.clicked(hit));
             if seen != self.model.selection {
                 self.end_mode();
             }

@@ -3,7 +3,6 @@
 use crate::dashboard::update::{Coalesce, Direction};
 use crate::dashboard::{Mode, UpdateContext};
 use glam::{DVec2, DVec3};
-use std::collections::BTreeSet;
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{self, Edit, EditError, Target, bounds, step_length};
 use zerkalo_scene::value::rotated_y;
@@ -65,15 +64,19 @@ impl UpdateContext<'_> {
     /// Marks the selection, or removes its mark.
     pub(super) fn toggle_mark(&mut self) {
         let subject = self.model.selection.clone();
-        if !matches!(subject, Target::Object(_) | Target::Light(_)) {
-            return self.refuse("Only objects and lights are marked");
+        if !matches!(subject, Target::Object(_) | Target::Part(..) | Target::Light(_)) {
+            return self.refuse("Only objects, parts and lights are marked");
         }
-        if !self.model.marked.remove(&subject) {
-            self.model.marked.insert(subject);
+        match self.model.marked.iter().position(|marked| *marked == subject) {
+            Some(at) => drop(self.model.marked.remove(at)),
+            None => self.model.marked.push(subject),
         }
         let text = match self.model.marked.is_empty() {
             true => "nothing is marked".to_string(),
-            false => format!("marked: {} · m r D x act on all · Esc unmarks", self.marked_label()),
+            false => format!(
+                "marked: {} · m r D x act on all · | & _ join · Esc unmarks",
+                self.marked_label()
+            ),
         };
         self.say(text);
     }
@@ -115,6 +118,32 @@ impl UpdateContext<'_> {
         self.move_by(by);
     }
 
+    /// Returns the middle of the underside of the selection or the marked parts.
+    fn foot(&self) -> DVec3 {
+        let balls = self.model.targets().into_iter().filter_map(|t| bounds(self.scene(), &t));
+        let balls: Vec<_> = balls.collect();
+        let middle = balls.iter().map(|b| b.center).sum::<DVec3>() / balls.len().max(1) as f64;
+        let lows = self.model.targets().into_iter().filter_map(|t| edit::lowest(self.scene(), &t));
+        middle.with_y(lows.reduce(f64::min).unwrap_or(middle.y))
+    }
+
+    /// Scales the selection or the marked parts about their foot.
+    pub(super) fn scale_selection(&mut self, factor: f64) -> Result<(), String> {
+        let foot = self.foot();
+        let edit = self.edit_marked("scale", |s, target| edit::scale(s, target, factor, foot));
+        let edit = edit.map_err(|error| error.to_string())?;
+        self.record(edit, Coalesce::Single);
+        Ok(())
+    }
+
+    /// Adds `count` copies of the selection or the marked parts, each moved `by` from the one before.
+    pub(super) fn array(&mut self, count: u32, by: DVec3) -> Result<(), String> {
+        let copied = |s: &Scene, target: &Target| edit::repeat(s, target, count, by.to_array());
+        let edit = self.edit_marked("array of", copied).map_err(|error| error.to_string())?;
+        self.record(edit, Coalesce::Single);
+        Ok(())
+    }
+
     /// Rotates the selection counter-clockwise as seen from above: the side that faces the viewer
     /// moves to the right.
     pub(super) fn rotate_selection(&mut self, degrees: f64) {
@@ -142,17 +171,17 @@ impl UpdateContext<'_> {
 
     /// Duplicates the selection or the marked parts, which are then ready to be moved.
     pub(super) fn duplicate(&mut self) {
-        let copies = std::cell::RefCell::new(BTreeSet::new());
+        let copies = std::cell::RefCell::new(Vec::new());
         let edit = self.edit_marked("duplicate", |scene, target| {
             let edit = edit::duplicate(scene, target)?;
-            copies.borrow_mut().insert(edit.target.clone());
+            copies.borrow_mut().push(edit.target.clone());
             Ok(edit)
         });
         if self.commit_and_select(edit) {
             let copies = copies.into_inner();
-            self.model.marked = if copies.len() > 1 { copies } else { BTreeSet::new() };
+            self.model.marked = if copies.len() > 1 { copies } else { Vec::new() };
             let label = self.marked_label();
-            if matches!(self.model.selection, Target::Object(_) | Target::Light(_)) {
+            if self.model.place_of_selection().is_some() {
                 self.enter_mode(Mode::Move);
             }
             self.say(format!("{label} added"));
@@ -175,6 +204,21 @@ impl UpdateContext<'_> {
                 self.say(format!("{label} deleted · u undoes"));
             }
         }
+    }
+
+    /// Makes a compound of the kind `kind` of the marked objects, the first marked first.
+    pub(super) fn join(&mut self, kind: &str) {
+        let edit = edit::join(self.scene(), &self.model.marked, kind);
+        if self.commit_and_select(edit) {
+            self.model.marked.clear();
+            let label = self.model.selection.label(self.scene());
+            self.say(format!("{label} is a {kind} · Right lists its parts · B dissolves it"));
+        }
+    }
+
+    pub(super) fn dissolve(&mut self) {
+        let edit = edit::dissolve(self.scene(), &self.model.selection);
+        self.commit_and_select(edit);
     }
 
     /// Adds what `edit` has added, without a form.

@@ -10,6 +10,9 @@ use zerkalo_render::{ErrorTarget, ROUNDING_TO_8_BITS};
 use zerkalo_scene::edit::{self, SceneSettings, Target};
 use zerkalo_scene::value::{number, truncated};
 
+/// Largest number of copies that one array adds.
+const MOST_COPIES: u32 = 50;
+
 impl UpdateContext<'_> {
     /// Opens a prompt with `text` in its editor. The edited text is passed to `apply`.
     fn prompt(
@@ -72,6 +75,26 @@ impl UpdateContext<'_> {
             Ok(())
         });
         self.continue_prompt(text);
+    }
+
+    pub(super) fn ask_scale(&mut self) {
+        let help = "A factor, such as 1.5 or .8. The underside stays where it is.";
+        self.prompt("scale by", help, "1", |c, text| {
+            let factor = text.parse().map_err(|_| "Type a factor, such as 1.5.".to_string())?;
+            c.scale_selection(factor)
+        });
+    }
+
+    pub(super) fn ask_array(&mut self) {
+        let help = "Copies, then axis and distance from each to the next, such as 4 x .5.";
+        self.prompt("array", help, "3 x 1", |c, text| {
+            let (count, by) = text.split_once(' ').unwrap_or((text, ""));
+            let count = count.parse().ok().filter(|n| (1..=MOST_COPIES).contains(n));
+            let wrong =
+                || format!("Type up to {MOST_COPIES} copies and a distance, such as 4 x .5.");
+            let (count, by) = count.zip(distances(by)).ok_or_else(wrong)?;
+            c.array(count, by.into())
+        });
     }
 
     /// Puts `text` into the prompt, so that typing goes on after it.

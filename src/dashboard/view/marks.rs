@@ -12,11 +12,22 @@ const OUTLINE: [[u8; 3]; 2] = [[255, 172, 60], [20, 20, 24]];
 /// Least difference in OKLab of the outline from the picture.
 const CONTRAST: f32 = 0.2;
 
-/// Returns `true` if the first hit of a camera ray is on the selection.
-pub fn is_selected(model: &Model, hit: &FirstHit) -> bool {
+/// Returns a function that returns `true` if the first hit of a camera ray is on the selection.
+pub fn is_selected(model: &Model) -> impl Fn(&FirstHit) -> bool {
+    let all = match &model.selection {
+        Target::Part(i, _) => Target::Object(*i).solids(model.scene()),
+        _ => Vec::new(),
+    };
+    let own = model.selection.solids(model.scene());
+    let is_own = move |part: u32| all.get(part as usize).is_some_and(|solid| own.contains(solid));
+    move |hit| is_on(model, hit, &is_own)
+}
+
+fn is_on(model: &Model, hit: &FirstHit, is_own_part: impl Fn(u32) -> bool) -> bool {
     let Some(index) = hit.object.map(|object| object as usize) else { return false };
     match &model.selection {
         Target::Object(selected) => *selected == index,
+        Target::Part(selected, _) => *selected == index && is_own_part(hit.part),
         Target::Material(name) => {
             model.scene().objects.get(index).is_some_and(|object| object.names_material(name))
         }

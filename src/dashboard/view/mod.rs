@@ -19,7 +19,7 @@ mod plot;
 mod status;
 #[cfg(test)]
 mod tests;
-mod theme;
+pub mod theme;
 mod watch;
 
 use crate::dashboard::layout::SMALLEST;

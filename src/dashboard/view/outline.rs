@@ -1,6 +1,5 @@
 //! Panel of the outline.
 
-use crate::dashboard::panel_lines::outline;
 use crate::dashboard::text::columns;
 use crate::dashboard::view::false_color::object_color;
 use crate::dashboard::view::is_active;
@@ -14,7 +13,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let active = is_active(model, Focus::Outline);
     painter.panel(area, "outline", active);
     let inner = area.inner(BORDER);
-    let lines = outline(model.scene());
+    let lines = model.outline_lines();
     // If the picture shows object ids as colours, each line has a mark in its object's colour.
     let with_ids = model.channel == DisplayChannel::Objects;
     let (scroll, border) = (model.outline_scroll, theme.border(active));
@@ -23,7 +22,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
             OutlineLine::Heading(title) => {
                 painter.row(inner, row).skip(1).put(title, theme.heading());
             }
-            OutlineLine::Entry(OutlineEntry { subject, label, note }) => {
+            OutlineLine::Entry(OutlineEntry { subject, label, depth, unfolded, note }) => {
                 let selected = (*subject == model.selection).then_some(active);
                 let ListRow { mut to, name, note: noted, .. } =
                     painter.list_row(inner, row, selected);
@@ -39,8 +38,15 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
                     }
                 };
                 // The name has precedence over the note.
-                to.put_right(" ", 0, name).put_right(note, 2 + columns(label), noted);
-                to.put(label, name);
+                let fold = match unfolded {
+                    Some(true) => " ▾",
+                    Some(false) => " ▸",
+                    None => "",
+                };
+                let indent = 2 * depth;
+                let taken = 2 + indent + columns(label) + columns(fold);
+                to.put_right(" ", 0, name).put_right(note, taken, noted);
+                to.put(&" ".repeat(indent), name).put(label, name).put(fold, noted);
             }
         }
     }

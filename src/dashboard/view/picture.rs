@@ -57,7 +57,8 @@ impl PictureView {
         let live = snapshot.and_then(|snapshot| beauty(model, snapshot, size));
         self.histogram = live.map(|live| Histogram::of(&live));
         let white_if = |inside: bool| [if inside { 255 } else { 0 }; 3];
-        let mask = |s| hit_colors(s, size, |hit| white_if(marks::is_selected(model, hit)));
+        let is_selected = marks::is_selected(model);
+        let mask = |s| hit_colors(s, size, |hit| white_if(is_selected(hit)));
         if let Some(mask) = model.snapshot.as_deref().filter(|_| model.shows_marks()).and_then(mask)
         {
             marks::outline(&mut raster, &mask);

@@ -82,6 +82,9 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
     if let Some(text) = sources(model, &probe.error_shares) {
         lines.push(("noise of", text));
     }
+    if let Some(text) = surfaces(model, &probe.tile_errors) {
+        lines.push(("noise on", text));
+    }
     if let Some(name) = seen(model, probe.pixel) {
         lines.push(("object", name));
     }
@@ -93,7 +96,26 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
 fn sources(model: &Model, shares: &[f64]) -> Option<String> {
     let lighting = model.snapshot.as_ref()?.lighting.as_ref()?;
     let names = lighting.groups.names(&lighting.compiled);
-    let mut found: Vec<_> = shares.iter().copied().zip(names).collect();
+    largest(shares.iter().copied().zip(names).collect())
+}
+
+/// Names the two objects that are seen first with the largest shares in the error of the probe's tile,
+/// as [`sources`] does. Returns `None` if only one is seen.
+fn surfaces(model: &Model, errors: &[([usize; 2], f64)]) -> Option<String> {
+    let mut found: Vec<(f64, String)> = Vec::new();
+    let sum: f64 = errors.iter().map(|(_, square)| square).sum();
+    for (pixel, square) in errors.iter().filter(|_| sum > 0.0) {
+        let name = seen(model, *pixel).unwrap_or_else(|| "background".to_string());
+        match found.iter_mut().find(|(_, known)| *known == name) {
+            Some((share, _)) => *share += square / sum,
+            None => found.push((square / sum, name)),
+        }
+    }
+    largest(found)
+}
+
+/// Formats the two largest shares; `None` if there is only one.
+fn largest(mut found: Vec<(f64, String)>) -> Option<String> {
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let percent = |(share, name): &(f64, String)| format!("{name} {:.0} %", 100.0 * share);
     let texts: Vec<_> = found.iter().take(2).map(percent).collect();

@@ -5,6 +5,7 @@
 
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::BorderType;
+use std::sync::OnceLock;
 use zerkalo_terminal::cells::{Colors, nearest_xterm};
 
 /// Styles for a set of terminal colours.
@@ -15,18 +16,42 @@ pub struct Theme {
 }
 
 /// Colour at three depths: 24 bits, index of xterm's 256 colours, one of 16 colours.
-type Tone = ([u8; 3], u8, Color);
+pub type Tone = ([u8; 3], u8, Color);
 
-const ACCENT: Tone = ([98, 160, 242], 75, Color::Cyan);
-const DIM: Tone = ([125, 130, 142], 245, Color::DarkGray);
-const BORDER: Tone = ([84, 90, 104], 240, Color::DarkGray);
-const GOOD: Tone = ([110, 178, 98], 71, Color::Green);
-const WARN: Tone = ([216, 154, 58], 172, Color::Yellow);
-const BAD: Tone = ([232, 98, 98], 167, Color::Red);
-const SELECTED_GROUND: Tone = ([40, 62, 98], 24, Color::Reset);
-const SELECTED_TEXT: Tone = ([242, 245, 250], 255, Color::Reset);
+/// Names of the tones in configuration files, and the tones as shipped. The constants are their indices.
+pub const SHIPPED_TONES: [(&str, Tone); 9] = [
+    ("accent", ([98, 160, 242], 75, Color::Cyan)),
+    ("dim", ([125, 130, 142], 245, Color::DarkGray)),
+    ("border", ([84, 90, 104], 240, Color::DarkGray)),
+    ("good", ([110, 178, 98], 71, Color::Green)),
+    ("warn", ([216, 154, 58], 172, Color::Yellow)),
+    ("bad", ([232, 98, 98], 167, Color::Red)),
+    ("selected-ground", ([40, 62, 98], 24, Color::Reset)),
+    ("selected-text", ([242, 245, 250], 255, Color::Reset)),
+    ("badge-ground", ([24, 24, 28], 234, Color::Black)),
+];
 
-const BADGE_GROUND: Tone = ([24, 24, 28], 234, Color::Black);
+const ACCENT: usize = 0;
+const DIM: usize = 1;
+const BORDER: usize = 2;
+const GOOD: usize = 3;
+const WARN: usize = 4;
+const BAD: usize = 5;
+const SELECTED_GROUND: usize = 6;
+const SELECTED_TEXT: usize = 7;
+const BADGE_GROUND: usize = 8;
+
+/// Tones by the user's configuration.
+static TONES: OnceLock<[Tone; 9]> = OnceLock::new();
+
+/// Sets the tones of the process, once.
+pub fn set_tones(tones: [Tone; 9]) {
+    let _ = TONES.set(tones);
+}
+
+pub fn tones() -> [Tone; 9] {
+    TONES.get().copied().unwrap_or(SHIPPED_TONES.map(|(_, tone)| tone))
+}
 
 impl Theme {
     fn color(&self, (rgb, indexed, ansi): Tone) -> Option<Color> {
@@ -42,9 +67,9 @@ impl Theme {
         }
     }
 
-    /// Returns the style with the colour `tone`, or with `plain` on terminals without colours.
-    fn toned(&self, tone: Tone, plain: Modifier) -> Style {
-        match self.color(tone) {
+    /// Returns the style with the colour of the tone with this index, or with `plain` on terminals without colours.
+    fn toned(&self, tone: usize, plain: Modifier) -> Style {
+        match self.color(tones()[tone]) {
             Some(color) => Style::new().fg(color),
             None => Style::new().add_modifier(plain).remove_modifier(Modifier::DIM - plain),
         }
@@ -85,7 +110,7 @@ impl Theme {
         match (active, self.colors) {
             (false, _) => self.accent().add_modifier(Modifier::BOLD),
             (true, Colors::True | Colors::Indexed) => {
-                let ground = self.color(SELECTED_GROUND).unwrap_or_default();
+                let ground = self.color(tones()[SELECTED_GROUND]).unwrap_or_default();
                 self.toned(SELECTED_TEXT, Modifier::empty()).bg(ground)
             }
             (true, _) => Style::new().add_modifier(Modifier::REVERSED),
@@ -98,7 +123,7 @@ impl Theme {
 
     /// Returns the ground of marks on the picture.
     pub fn badge(&self) -> Style {
-        self.color(BADGE_GROUND).map_or(Style::new(), |ground| Style::new().bg(ground))
+        self.color(tones()[BADGE_GROUND]).map_or(Style::new(), |ground| Style::new().bg(ground))
     }
 
     /// Returns the border type. With few or no colours, a thick border marks the focus.

@@ -25,6 +25,8 @@ pub struct PixelProbe {
     /// Share of each light group in the squared error of the pixel's tile in linear radiance; empty
     /// without an estimate or without error.
     pub error_shares: Vec<f64>,
+    /// Pixels of the film in the pixel's tile, each with the squared difference of the replicates.
+    pub tile_errors: Vec<([usize; 2], f64)>,
 }
 
 impl PixelProbe {
@@ -66,6 +68,17 @@ impl PixelProbe {
         if sum > 0.0 {
             probe.error_shares = squares.into_iter().map(|square| square / sum).collect();
         }
+        let [left, top] = [x, y].map(|at| at / TILE * TILE);
+        let pixels = (0..TILE * TILE).map(|i| [left + i % TILE, top + i / TILE]);
+        let errors = pixels.enumerate().filter_map(|(i, [x, y])| {
+            let sums = tile.sums(i);
+            let is_inside = x < film.header.width && y < film.header.height;
+            let [a, b] =
+                [Replicates::A, Replicates::B].map(|replicates| sums.mean(replicates, &per_unit));
+            let square = (0..3).map(|c| (a[c] - b[c]).powi(2)).sum();
+            (is_inside && !sums.counts.contains(&0)).then_some(([x, y], square))
+        });
+        probe.tile_errors = errors.collect();
         Some(probe)
     }
 }
@@ -101,6 +114,8 @@ mod tests {
         assert_eq!(full.tile_rmse_levels, Some(noise.levels.sqrt()));
         assert!(noise.levels > 0.0);
         assert_eq!(full.error_shares, [1.0, 0.0], "the second light has no error");
+        let errors = full.tile_errors;
+        assert!(errors.len() == 8 && errors[7] == ([19, 17], 20.0) && errors[0].1 == 0.0);
         film.restart();
         each_tile(&mut film, |tile, _| tile.set_lattice(8));
         assert_eq!(probe(&film, [16, 16]).unwrap().samples, [1, 0]);

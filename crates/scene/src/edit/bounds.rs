@@ -3,6 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
 use crate::edit::Target;
+use crate::edit::compound::{body, form, scene_from_compound};
 use crate::value::floor_log10;
 use crate::{Object, Scene};
 use glam::DVec3;
@@ -11,23 +12,21 @@ use zerkalo_kernel::primitive::BoundingSphere;
 /// Bounding box with sides parallel to the axes: `(lowest corner, highest corner)`.
 pub(super) type Extent = (DVec3, DVec3);
 
-/// Returns the bounding sphere of an object, light or material; `None` for other targets. An
+/// Returns the bounding sphere of an object, part, light or material; `None` for other targets. An
 /// infinite object, such as a plane, has a sphere around its position, with the radius R of
 /// [`scene_bounds`]. A light has a sphere with its own radius, at least R / 10, and none without a
 /// position. The sphere of a material contains all finite objects that use it.
 pub fn bounds(scene: &Scene, target: &Target) -> Option<BoundingSphere> {
     match target {
-        Target::Object(i) => {
-            let object = scene.objects.get(*i)?;
-            Some(match object.form().bounds() {
-                Some(extent) => ball(extent),
-                None => {
-                    let point = object.shape.position();
-                    let center = object.scene_from_object().transform_point3(point);
-                    BoundingSphere { center, radius: scene_bounds(scene).radius }
-                }
-            })
-        }
+        Target::Object(_) | Target::Part(..) => Some(match form(scene, target)?.bounds() {
+            Some(extent) => ball(extent),
+            None => {
+                let body = body(scene, target).ok()?;
+                let map = scene_from_compound(scene, target) * body.scene_from_object();
+                let center = map.transform_point3(body.shape.position());
+                BoundingSphere { center, radius: scene_bounds(scene).radius }
+            }
+        }),
         Target::Light(i) => {
             let light = scene.lights.get(*i)?;
             let usual = scene_bounds(scene).radius / 10.0;
@@ -40,6 +39,11 @@ pub fn bounds(scene: &Scene, target: &Target) -> Option<BoundingSphere> {
         }
         Target::Camera | Target::View(_) | Target::Settings(_) => None,
     }
+}
+
+/// Returns the height of the lowest point of an object or part; `None` if it has none.
+pub fn lowest(scene: &Scene, target: &Target) -> Option<f64> {
+    form(scene, target)?.bounds().map(|(low, _)| low.y)
 }
 
 /// Returns the bounding sphere of all solids; without solids, of all finite objects; without these,

@@ -6,6 +6,7 @@
 use crate::Scene;
 use crate::camera::{Camera, Focus, ViewAngle};
 use crate::edit::bounds::scene_bounds;
+use crate::edit::compound::{body, set_body};
 use crate::edit::lens;
 use crate::edit::set::{label, replace};
 use crate::edit::{Edit, EditError, Target};
@@ -58,12 +59,13 @@ pub(super) fn switch(
             let camera = next.cameras.get_mut(view).ok_or_else(|| EditError::gone(target))?;
             switch_camera(camera, scene, key, name);
         }
-        Target::Object(i) => {
-            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(target))?;
-            if object.shape.key() != name
-                && let Some(shape) = convert_shape(&object.shape, name, scene)
+        Target::Object(_) | Target::Part(..) => {
+            let mut body = body(scene, target)?;
+            if body.shape.key() != name
+                && let Some(shape) = convert_shape(&body.shape, name, scene)
             {
-                object.shape = shape;
+                body.shape = shape;
+                set_body(&mut next, target, body);
             }
         }
         Target::Material(material) => {

@@ -3,77 +3,102 @@
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
 use crate::edit::bounds::bounds;
+use crate::edit::compound::{body, copy_part, material, remove_part, set_body};
 use crate::edit::parse_value::name;
 use crate::edit::placement::place_for;
-use crate::edit::translate::move_object;
+use crate::edit::translate::{move_by, move_object, moved};
 use crate::edit::unique_name::{free_light, free_material, free_object, free_view};
 use crate::edit::{Edit, EditError, Target};
-use crate::value::truncated;
+use crate::value::{floor_log10, rounded_to, truncated};
 use crate::{Object, Scene};
 use glam::DVec3;
 
-/// Duplicates an object, a light, a material or a stored camera under a name such as `cube 2`. An
-/// object is moved to a free place on the same level, or down if it is infinite. A light is moved
-/// along x. Fails for targets of which a scene has exactly one, such as the camera.
+/// Duplicates an object, a part, a light, a material or a stored camera under a name such as `cube 2`.
+/// An object is moved to a free place on the same level, or down if it is infinite; a part is moved by
+/// its width, a light along x. Fails for targets of which a scene has exactly one, such as the camera.
 pub fn duplicate(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
-    if !target.exists(scene) {
-        return Err(EditError::gone(target));
-    }
     let mut next = scene.clone();
-    let copy = match target {
-        Target::Object(i) => {
-            let mut copy = scene.objects[*i].clone();
-            if !copy.name.is_empty() {
-                copy.name = free_object(scene, &copy.name);
+    let copy = add_copy(&mut next, target)?;
+    let mut by = [0.0; 3];
+    if let Ok(body) = body(scene, target) {
+        by = match (body.form().bounds(), target) {
+            (Some((low, high)), Target::Part(..)) => {
+                let width = (high.x - low.x).clamp(1e-6, 1e6);
+                [rounded_to(width, floor_log10(width) - 2), 0.0, 0.0]
             }
-            if let Some((low, high)) = copy.form().bounds() {
+            (Some((low, high)), _) => {
                 let size = high - low;
                 let usual = size.max_element();
                 let base = place_for(scene, size.map(|s| s.max(1e-3 * usual)));
                 let from = DVec3::new((low.x + high.x) / 2.0, low.y, (low.z + high.z) / 2.0);
                 // The copy is at the same height above the ground as the original.
                 let by = DVec3::new(base.x - from.x, 0.0, base.z - from.z);
-                let digits = crate::value::floor_log10(usual) - 3;
-                let by = by.map(|x| crate::value::rounded_to(x, digits));
-                move_object(&mut copy, by.to_array());
-            } else {
-                let ball = bounds(scene, target);
-                move_object(&mut copy, [0.0, -0.1 * ball.map_or(1.0, |b| b.radius), 0.0]);
+                by.map(|x| rounded_to(x, floor_log10(usual) - 3)).to_array()
             }
-            next.objects.push(copy);
-            Target::Object(next.objects.len() - 1)
+            (None, _) => [0.0, -0.1 * bounds(scene, target).map_or(1.0, |b| b.radius), 0.0],
+        };
+        let mut copied = self::body(&next, &copy)?;
+        move_object(&mut copied, by);
+        set_body(&mut next, &copy, copied);
+    } else if let Target::Light(i) = copy {
+        by[0] = 5.0 * crate::edit::step_length(scene);
+        next.lights[i].position_mut().into_iter().for_each(|at| *at = moved(*at, by));
+    }
+    Edit::checked(next, copy, format!("duplicate {}", target.label(scene)))
+}
+
+/// Adds `count` copies of an object, a part or a light, each moved `by` from the one before.
+pub fn repeat(scene: &Scene, target: &Target, count: u32, by: [f64; 3]) -> Result<Edit, EditError> {
+    let mut next = scene.clone();
+    let mut last = target.clone();
+    for n in 1..=count {
+        last = add_copy(&mut next, target)?;
+        next = move_by(&next, &last, by.map(|x| x * f64::from(n)))?.scene;
+    }
+    Edit::checked(next, last, format!("array of {}", target.label(scene)))
+}
+
+/// Adds a copy of `target` in its place, under a free name. Returns the copy.
+fn add_copy(scene: &mut Scene, target: &Target) -> Result<Target, EditError> {
+    if !target.exists(scene) {
+        return Err(EditError::gone(target));
+    }
+    Ok(match target {
+        Target::Object(i) => {
+            let mut copy = scene.objects[*i].clone();
+            if !copy.name.is_empty() {
+                copy.name = free_object(scene, &copy.name);
+            }
+            scene.objects.push(copy);
+            Target::Object(scene.objects.len() - 1)
         }
+        Target::Part(..) => copy_part(scene, target).ok_or_else(|| EditError::gone(target))?,
         Target::Light(i) => {
             let mut copy = scene.lights[*i].clone();
             if !copy.name.is_empty() {
                 copy.name = free_light(scene, &copy.name);
             }
-            if let Some(position) = copy.position_mut() {
-                let step = crate::edit::step_length(scene);
-                *position = crate::edit::translate::moved(*position, [5.0 * step, 0.0, 0.0]);
-            }
-            next.lights.push(copy);
-            Target::Light(next.lights.len() - 1)
+            scene.lights.push(copy);
+            Target::Light(scene.lights.len() - 1)
         }
         Target::Material(old) => {
             let new = free_material(scene, old);
-            next.materials.insert(new.clone(), scene.materials[old].clone());
+            scene.materials.insert(new.clone(), scene.materials[old].clone());
             Target::Material(new)
         }
         Target::View(old) => {
             let new = free_view(scene, old);
-            next.cameras.insert(new.clone(), scene.cameras[old].clone());
+            scene.cameras.insert(new.clone(), scene.cameras[old].clone());
             Target::View(new)
         }
         Target::Camera | Target::Settings(_) => {
             let found = format!("there is only one {}", target.label(scene));
             return Err(EditError::new(&found, ""));
         }
-    };
-    Edit::checked(next, copy, format!("duplicate {}", target.label(scene)))
+    })
 }
 
-/// Deletes an object, a light, a stored camera or a material. Objects whose material is deleted get
+/// Deletes an object, a part, a light, a stored camera or a material. Objects whose material is deleted get
 /// the default material, parts of compounds get that of the whole; the note names these objects.
 /// Fails for targets that every scene has.
 pub fn delete(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
@@ -90,6 +115,7 @@ pub fn delete(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
             next.objects.remove(*i);
             neighbour(*i, next.objects.len()).map(Target::Object)
         }
+        Target::Part(..) => remove_part(&mut next, target),
         Target::Light(i) => {
             next.lights.remove(*i);
             neighbour(*i, next.lights.len()).map(Target::Light)
@@ -180,7 +206,7 @@ pub fn rename(scene: &Scene, target: &Target, new: &str) -> Result<Edit, EditErr
             next.cameras.extend(moved.map(|view| (new.clone(), view)));
             Target::View(new.clone())
         }
-        Target::Camera | Target::Settings(_) => {
+        Target::Part(..) | Target::Camera | Target::Settings(_) => {
             let found = format!("{} has no name to change", target.label(scene));
             return Err(EditError::new(&found, ""));
         }
@@ -188,18 +214,18 @@ pub fn rename(scene: &Scene, target: &Target, new: &str) -> Result<Edit, EditErr
     Edit::checked(next, select, format!("rename {}", target.label(scene)))
 }
 
-/// Gives an object a copy of its material that no other object uses.
+/// Gives an object or a part a copy of its material that no other object uses.
 pub fn own_material(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
-    let Target::Object(index) = target else {
+    let Ok(mut body) = body(scene, target) else {
         return Err(EditError::new("only objects have a material", "Select an object."));
     };
-    let object = scene.objects.get(*index).ok_or_else(|| EditError::gone(target))?;
     let mut next = scene.clone();
-    let old = scene.materials.get(&object.material).cloned().unwrap_or_default();
-    let wanted = if object.name.is_empty() { object.shape.key() } else { &object.name };
+    let old = material(scene, target).cloned().unwrap_or_default();
+    let wanted = if body.name.is_empty() { body.shape.key() } else { &body.name };
     let new = free_material(scene, wanted);
     next.materials.insert(new.clone(), old);
-    next.objects[*index].material = new.clone();
+    body.material.clone_from(&new);
+    set_body(&mut next, target, body);
     let label = format!("own material for {}", target.label(scene));
     Ok(Edit::checked(next, target.clone(), label)?
         .with_note(Some(format!("Its material is {} now.", truncated(&new)))))

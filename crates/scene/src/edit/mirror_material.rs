@@ -26,7 +26,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     };
     let reflecting = |objects: &[Object]| mirror_of(scene, objects).map(str::to_string);
     let selected_object = || match selected {
-        Some(Target::Object(i)) => scene.objects.get(*i),
+        Some(Target::Object(i) | Target::Part(i, _)) => scene.objects.get(*i),
         _ => None,
     };
     // Rectangles of any orientation count; the ground (`platform`) does not.

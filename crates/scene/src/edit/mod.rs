@@ -3,6 +3,7 @@
 
 mod add;
 mod bounds;
+mod compound;
 mod convert;
 mod copy;
 mod increment;
@@ -16,6 +17,7 @@ mod placement;
 mod properties;
 mod ready_made;
 mod rotate;
+mod scale;
 mod set;
 mod target;
 mod translate;
@@ -23,8 +25,9 @@ mod unique_name;
 mod viewpoints;
 
 pub use add::{add_light, add_object, light_kinds, object_kinds};
-pub use bounds::{bounds, pivot_distance, scene_bounds, step_length};
-pub use copy::{delete, duplicate, own_material, rename};
+pub use bounds::{bounds, lowest, pivot_distance, scene_bounds, step_length};
+pub use compound::{add_part, dissolve, join, part_kinds, solid_at};
+pub use copy::{delete, duplicate, own_material, rename, repeat};
 pub use increment::{step, toggle};
 pub use lens::{change_aperture, focus_on};
 pub use mirror_material::{mirror, step_mirror};
@@ -35,6 +38,7 @@ pub use ready_made::{
     ready_objects,
 };
 pub use rotate::rotate;
+pub use scale::scale;
 pub use set::{set, set_component};
 pub use target::{SceneSettings, Section, Target, outline};
 pub use translate::move_by;
@@ -87,6 +91,7 @@ impl EditError {
             Target::Material(name) => format!("there is no material \"{}\"", truncated(name)),
             Target::Light(i) => format!("there is no light {}", i + 1),
             Target::Object(i) => format!("there is no object {}", i + 1),
+            Target::Part(..) => "there is no such part".to_string(),
             Target::Camera | Target::Settings(_) => "it cannot be read".to_string(),
         };
         Self::new(&what, "")

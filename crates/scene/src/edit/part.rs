@@ -1,12 +1,17 @@
 //! Access to the values of edit targets by key path.
 
+use crate::edit::compound::{operand, operand_mut};
 use crate::edit::{EditError, Target};
 use crate::light::LightKind;
-use crate::value::{Field, KeyNode, ValueType};
+use crate::shape::CsgOperand;
+use crate::value::{Description, Field, KeyNode, ValueType};
 use crate::{FIELDS, Scene};
 
 /// Returns the keys that scene files permit for `target`, with their types and defaults.
 pub(super) fn fields(target: &Target) -> &'static [Field] {
+    if let Target::Part(..) = target {
+        return CsgOperand::FIELDS;
+    }
     match FIELDS.iter().find(|field| field.name == target.path()[0]).map(|field| field.takes) {
         Some(ValueType::Table(fields) | ValueType::Named(fields)) => fields,
         Some(ValueType::Tables(fields)) => fields(),
@@ -20,14 +25,18 @@ pub(super) fn exclusive_keys(target: &Target) -> &'static [&'static str] {
         Target::Camera | Target::View(_) => &["target", "direction"],
         Target::Light(_) => LightKind::KEYS,
         Target::Material(_) => &["f0", "metal"],
-        Target::Object(_) | Target::Settings(_) => &[],
+        Target::Object(_) | Target::Part(..) | Target::Settings(_) => &[],
     }
 }
 
 /// Returns the part of `scene` that `target` names.
 pub(super) fn part<'a>(scene: &'a Scene, target: &Target) -> Result<&'a dyn KeyNode, EditError> {
     let root: &dyn KeyNode = scene;
-    let part = target.path().iter().try_fold(root, |node, key| node.child(key));
+    let part = if let Target::Part(i, path) = target {
+        operand(scene, *i, path).map(|part| part as &dyn KeyNode)
+    } else {
+        target.path().iter().try_fold(root, |node, key| node.child(key))
+    };
     part.ok_or_else(|| EditError::gone(target))
 }
 
@@ -36,6 +45,10 @@ pub(super) fn part_mut<'a>(
     scene: &'a mut Scene,
     target: &Target,
 ) -> Result<&'a mut dyn KeyNode, EditError> {
+    if let Target::Part(i, path) = target {
+        let part = operand_mut(scene, *i, path).map(|part| part as &mut dyn KeyNode);
+        return part.ok_or_else(|| EditError::gone(target));
+    }
     let root: &mut dyn KeyNode = scene;
     let part = target.path().iter().try_fold(root, |node, key| node.child_mut(key));
     part.ok_or_else(|| EditError::gone(target))

@@ -76,7 +76,7 @@ pub fn rows(scene: &Scene, target: &Target) -> Result<Vec<Property>, EditError> 
     let virtual_kind = match target {
         Target::Light(_) => Some(&KIND),
         Target::Camera | Target::View(_) => Some(&AIM),
-        Target::Object(_) | Target::Material(_) | Target::Settings(_) => None,
+        Target::Object(_) | Target::Part(..) | Target::Material(_) | Target::Settings(_) => None,
     };
     let given = given_key(part, target);
     let hidden_key =
@@ -249,7 +249,7 @@ fn given_kind<'a>(
 
 /// Returns `true` if the value of `field` in `target` is the name of a material.
 pub(super) fn is_material(target: &Target, field: &Field) -> bool {
-    matches!(target, Target::Object(_)) && field.name == "material"
+    matches!(target, Target::Object(_) | Target::Part(..)) && field.name == "material"
 }
 
 /// Returns a [`Word`] for each of the fields `kinds`, with the name and the help text of the field.

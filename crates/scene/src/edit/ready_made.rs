@@ -4,6 +4,7 @@
 
 use crate::edit::add::{add_light_as, add_object, free_color, plane_height, usual_size};
 use crate::edit::bounds::pivot_distance;
+use crate::edit::compound::{body, material, set_body};
 use crate::edit::placement::ground_height;
 use crate::edit::properties::Word;
 use crate::edit::unique_name::{free_material, free_object};
@@ -80,19 +81,19 @@ pub fn add_ready_light(scene: &Scene, name: &str) -> Result<Edit, EditError> {
     add_light_as(scene, kind, (name, color, size))
 }
 
-/// Gives an object the material of a preset, or a material the preset itself. A plastic or diffuse
+/// Gives an object or a part the material of a preset, or a material the preset itself. A plastic or diffuse
 /// object keeps its colour.
 pub fn give_preset(scene: &Scene, target: &Target, word: &str) -> Result<Edit, EditError> {
-    let Target::Object(i) = target else {
+    let Ok(mut body) = body(scene, target) else {
         let Target::Material(_) = target else {
             return Err(EditError::new("only objects and materials can be made of it", ""));
         };
         return set(scene, target, "preset", word);
     };
-    let object = scene.objects.get(*i).ok_or_else(|| EditError::gone(target))?;
-    let color = scene.materials.get(&object.material).map(|material| material.color);
+    let color = material(scene, target).map(|material| material.color);
     let mut next = scene.clone();
-    next.objects[*i].material = material_of(&mut next, preset(word)?, color);
+    body.material = material_of(&mut next, preset(word)?, color);
+    set_body(&mut next, target, body);
     Edit::checked(next, target.clone(), format!("make {} {word}", target.label(scene)))
 }
 

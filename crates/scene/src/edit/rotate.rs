@@ -3,6 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
 use crate::edit::bounds::scene_bounds;
+use crate::edit::compound::{body, set_body};
 use crate::edit::{Edit, EditError, Target};
 use crate::shape::wrapped_angle;
 use crate::value::{floor_log10, rotated_y, rounded_to, sin_cos_degrees};
@@ -10,7 +11,8 @@ use crate::{Object, Scene, TransformOp};
 use glam::DVec3;
 
 /// Rotates an object or a light by `degrees` about a vertical axis, counter-clockwise seen from
-/// above. The axis goes through the centre of the object or, for a light, of the scene.
+/// above. The axis goes through the centre of the object or, for a light, of the scene. A part rotates
+/// about the vertical of its compound.
 ///
 /// An object with a transform, or with a shape that has no keys for the rotation, gets a rotation
 /// and a translation at the end of its transform; later rotations change these two steps. Fails for
@@ -21,11 +23,12 @@ pub fn rotate(scene: &Scene, target: &Target, degrees: f64) -> Result<Edit, Edit
     }
     let mut next = scene.clone();
     match target {
-        Target::Object(i) => {
-            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(target))?;
-            if !object.transform.is_empty() || !object.shape.rotate_y(degrees) {
-                rotate_by_steps(object, degrees);
+        Target::Object(_) | Target::Part(..) => {
+            let mut body = body(scene, target)?;
+            if !body.transform.is_empty() || !body.shape.rotate_y(degrees) {
+                rotate_by_steps(&mut body, degrees);
             }
+            set_body(&mut next, target, body);
         }
         Target::Light(i) => {
             let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(target))?;

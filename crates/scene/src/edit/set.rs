@@ -3,6 +3,7 @@
 use crate::Scene;
 use crate::TransformOp;
 use crate::edit::add::fit_mesh;
+use crate::edit::compound::{body, set_body};
 use crate::edit::convert;
 use crate::edit::convert::{AIM, KIND};
 use crate::edit::parse_value::{parse, word};
@@ -30,11 +31,13 @@ pub fn set(scene: &Scene, target: &Target, key: &str, text: &str) -> Result<Edit
         let name = word(field, text, kinds.iter().map(|k| k.name))?;
         return convert::switch(scene, target, key, name);
     }
-    if let (Target::Object(i), ValueType::ListOf(steps)) = (target, field.takes) {
+    if let (Target::Object(_) | Target::Part(..), ValueType::ListOf(steps)) = (target, field.takes)
+    {
         let name = word(field, text, steps.iter().map(|k| k.name))?;
         let is_named = |step: &TransformOp| step.value() == Some(KeyValue::Text(name.to_string()));
-        let mut next = scene.clone();
-        next.objects[*i].transform.extend(TransformOp::IDENTITIES.into_iter().find(is_named));
+        let (mut next, mut body) = (scene.clone(), body(scene, target)?);
+        body.transform.extend(TransformOp::IDENTITIES.into_iter().find(is_named));
+        set_body(&mut next, target, body);
         return Edit::checked(next, target.clone(), label(scene, target, key));
     }
     let value = if is_material(target, field) {
@@ -128,12 +131,13 @@ fn clear(scene: &Scene, target: &Target, key: &str, field: &Field) -> Result<Edi
     let mut next = scene.clone();
     let base = part(scene, target)?.base();
     let of_base = base.and_then(|base| node_at(base.as_ref(), key)?.value());
-    if let (Target::Object(object), Some(step)) = (target, key.strip_prefix("transform.")) {
-        let steps = &mut next.objects[*object].transform;
+    if let (Ok(mut body), Some(step)) = (body(scene, target), key.strip_prefix("transform.")) {
+        let steps = &mut body.transform;
         match step.split('.').next().and_then(|index| index.parse::<usize>().ok()) {
             Some(i) if i < steps.len() => drop(steps.remove(i)),
             _ => return Err(EditError::new(&format!("there is no step {key}"), "")),
         }
+        set_body(&mut next, target, body);
     } else if let Some(node) = node_at_mut(part_mut(&mut next, target)?, key) {
         match (field.preset, of_base) {
             (DefaultValue::Required, _) => {

@@ -2,6 +2,7 @@
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
+use crate::edit::compound::operand;
 use crate::edit::part::part;
 use crate::value::truncated;
 use crate::{Object, Scene};
@@ -19,6 +20,9 @@ pub enum Target {
     Light(usize),
     /// Object, by its index.
     Object(usize),
+    /// Part of a compound: the index of the object, and that of the part in each compound, the
+    /// outermost first.
+    Part(usize, Vec<usize>),
     /// Material, by its name.
     Material(String),
     Settings(SceneSettings),
@@ -67,12 +71,19 @@ pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     list.push((Section::Surroundings, Target::Settings(SceneSettings::Ambient)));
     list.push((Section::Surroundings, Target::Settings(SceneSettings::Background)));
     list.extend((0..scene.lights.len()).map(|i| (Section::Lights, Target::Light(i))));
-    list.extend((0..scene.objects.len()).map(|i| (Section::Objects, Target::Object(i))));
+    (0..scene.objects.len()).for_each(|i| add_tree(scene, Target::Object(i), &mut list));
     let materials = scene.materials.keys();
     list.extend(materials.map(|name| (Section::Materials, Target::Material(name.clone()))));
     list.push((Section::Picture, Target::Settings(SceneSettings::Film)));
     list.push((Section::Picture, Target::Settings(SceneSettings::Integrator)));
     list
+}
+
+/// Adds an object or a part, and the parts of it.
+fn add_tree(scene: &Scene, target: Target, list: &mut Vec<(Section, Target)>) {
+    let parts = target.parts(scene);
+    list.push((Section::Objects, target));
+    parts.into_iter().for_each(|part| add_tree(scene, part, list));
 }
 
 /// Returns the material with the largest reflection coefficient among those of `objects` and their
@@ -101,7 +112,7 @@ impl Target {
             Self::View(name) => &["cameras", name],
             Self::Material(name) => &["materials", name],
             Self::Light(i) => &["light", &i.to_string()],
-            Self::Object(i) => &["object", &i.to_string()],
+            Self::Object(i) | Self::Part(i, _) => &["object", &i.to_string()],
         };
         keys.iter().map(|key| key.to_string()).collect()
     }
@@ -119,6 +130,10 @@ impl Target {
                 let kind = object.map_or("object", |o| o.shape.key());
                 named(object.map(|o| &o.name)).unwrap_or_else(|| format!("{kind} {}", i + 1))
             }
+            Self::Part(i, path) => {
+                let kind = operand(scene, *i, path).map_or("part", |part| part.shape.key());
+                format!("{kind} {}", path.last().map_or(0, |i| i + 1))
+            }
             // These targets are tables, named by their key.
             Self::Camera | Self::Settings(_) => self.path().concat(),
         }
@@ -126,18 +141,25 @@ impl Target {
 
     /// Returns the name of the target in diagnostics: `object "queen"`, `light 2`, `camera`.
     pub fn title(&self, scene: &Scene) -> String {
-        scene.subject(&self.path())
+        match self.compound() {
+            Some(compound) => format!("{} of {}", self.label(scene), compound.title(scene)),
+            None => scene.subject(&self.path()),
+        }
     }
 
-    /// Returns this target if it is a material, or the material of this object. Returns `None` for
-    /// other targets, and if the scene does not have the material.
+    /// Returns this target if it is a material, or the material of this object or part. Returns `None`
+    /// for other targets, and if the scene does not have the material.
     pub fn material(&self, scene: &Scene) -> Option<Self> {
         let name = match self {
-            Self::Material(name) => name,
+            Self::Material(name) => name.as_str(),
             Self::Object(i) => &scene.objects.get(*i)?.material,
+            Self::Part(i, path) => match operand(scene, *i, path)?.material.as_str() {
+                "" => return self.compound()?.material(scene),
+                name => name,
+            },
             Self::Camera | Self::View(_) | Self::Light(_) | Self::Settings(_) => return None,
         };
-        scene.materials.contains_key(name).then(|| Self::Material(name.clone()))
+        scene.materials.contains_key(name).then(|| Self::Material(name.to_string()))
     }
 }
 

@@ -4,13 +4,14 @@
 
 use crate::camera::Camera;
 use crate::edit::bounds::scene_bounds;
+use crate::edit::compound::{body, in_compound, set_body};
 use crate::edit::{Edit, EditError, Target};
 use crate::light::Light;
 use crate::value::{floor_log10, rounded_to, unit};
 use crate::{Object, Scene, TransformOp};
 use glam::DVec3;
 
-/// Moves an object, a light or a camera by a vector in scene units. An object with a transform, or
+/// Moves an object, a part of one, a light or a camera by a vector in scene units. An object with a transform, or
 /// without coordinates in its shape, gets a translation as the last step. A directional light is
 /// treated as a lamp, three radii of the scene from the origin, that moves by `by` and stays aimed
 /// at the origin. Fails for other targets, and for coordinates out of range.
@@ -20,9 +21,10 @@ pub fn move_by(scene: &Scene, target: &Target, by: [f64; 3]) -> Result<Edit, Edi
     }
     let mut next = scene.clone();
     match target {
-        Target::Object(i) => {
-            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(target))?;
-            move_object(object, by);
+        Target::Object(_) | Target::Part(..) => {
+            let mut body = body(scene, target)?;
+            move_object(&mut body, in_compound(scene, target, by));
+            set_body(&mut next, target, body);
         }
         Target::Light(i) => {
             let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(target))?;

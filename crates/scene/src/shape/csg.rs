@@ -68,8 +68,8 @@ macro_rules! compounds {
                 Some(&self.of)
             }
 
-            fn parts_mut(&mut self) -> &mut [CsgOperand] {
-                &mut self.of
+            fn parts_mut(&mut self) -> Option<&mut Vec<CsgOperand>> {
+                Some(&mut self.of)
             }
         }
     )+};
@@ -134,7 +134,7 @@ fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
 }
 
 /// Returns the reason why `shape` cannot be a part of a compound; `None` if it can be one.
-fn unfit_reason(shape: &Shape) -> Option<&'static str> {
+pub(crate) fn unfit_reason(shape: &Shape) -> Option<&'static str> {
     match shape {
         Shape::Rectangle(_) | Shape::HorizontalRectangle(_) => {
             Some("is flat: nothing is inside it")
@@ -221,7 +221,7 @@ impl Shape {
     /// Returns the material names of all parts, including nested parts. Names may be empty.
     pub fn part_names_mut(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
-        for part in self.parts_mut() {
+        for part in self.parts_mut().into_iter().flatten() {
             names.push(&mut part.material);
             names.extend(part.shape.part_names_mut());
         }

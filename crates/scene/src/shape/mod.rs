@@ -25,6 +25,7 @@ mod transform;
 mod unit_frustum;
 
 pub use cone::Cone;
+pub(crate) use csg::unfit_reason;
 pub use csg::{CsgOperand, Difference, Intersection, MAX_DEPTH, Union};
 pub use cube::Cube;
 pub use cuboid::Cuboid;

@@ -51,9 +51,9 @@ pub trait ShapeDesc: KeyNode {
         None
     }
 
-    /// Returns the parts of a compound; empty for any other kind.
-    fn parts_mut(&mut self) -> &mut [CsgOperand] {
-        &mut []
+    /// Returns [`ShapeDesc::parts`] as a mutable reference.
+    fn parts_mut(&mut self) -> Option<&mut Vec<CsgOperand>> {
+        None
     }
 
     /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace): right-handed,

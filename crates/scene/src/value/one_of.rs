@@ -182,7 +182,7 @@ macro_rules! kinds {
                 &[$(($key, <$kind as $crate::value::Description>::EXAMPLE)),+];
 
             /// Creates the default value of the kind `key`; `None` if there is no such kind.
-            fn of_kind(key: &str) -> Option<Self> {
+            pub(crate) fn of_kind(key: &str) -> Option<Self> {
                 let mut value = Self::default();
                 $crate::value::KeyNode::make_child(&mut value, key)?;
                 Some(value)

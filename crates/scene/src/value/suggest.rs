@@ -16,7 +16,7 @@ pub fn nearest<'a>(given: &str, words: impl IntoIterator<Item = &'a str>) -> Opt
 }
 
 /// Returns ` Did you mean "word"?` with the [`nearest`] word, or an empty string.
-pub(crate) fn did_you_mean<'a>(given: &str, words: impl IntoIterator<Item = &'a str>) -> String {
+pub fn did_you_mean<'a>(given: &str, words: impl IntoIterator<Item = &'a str>) -> String {
     let word = nearest(given, words).map(truncated);
     word.map_or(String::new(), |word| format!(" Did you mean \"{word}\"?"))
 }

@@ -8,6 +8,8 @@ use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, distinct};
 pub struct FirstHit {
     /// Index of the object in the scene; `None` for the background.
     pub object: Option<u32>,
+    /// Index of the part of the object that was hit; 0 unless the object is a compound.
+    pub part: u32,
     /// Distance from the eye to the hit point in scene units; infinite for the background.
     pub depth: f32,
     /// Unit geometric normal on the side that faces the eye; zero for the background.
@@ -19,7 +21,7 @@ pub struct FirstHit {
 impl FirstHit {
     /// First hit of a ray that hits no object.
     pub const MISS: Self =
-        Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
+        Self { object: None, part: 0, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
 
 impl<L: SimdFloat> World<L> {
@@ -51,13 +53,15 @@ fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut 
     for (primitive, lanes) in distinct(hit.primitive, hit.t.lt(L::from_f64(L::MAX))) {
         let normal = world.geometry.surface(primitive, hit.triangle, hit_points).normal;
         let facing = normal.dot(ray.direction);
+        let source = &world.geometry.sources[primitive as usize];
         let bsdf = &world.bsdfs[world.bsdf_of[primitive as usize] as usize];
         for (lane, hit) in hits.iter_mut().enumerate().filter(|(l, _)| lanes.lane(*l)) {
             let front = facing.lane(lane).to_f64() < 0.0;
             let side = if front { 1.0 } else { -1.0 };
             let axis = |c: L| (side * c.lane(lane).to_f64()) as f32;
             *hit = FirstHit {
-                object: Some(world.geometry.sources[primitive as usize].form as u32),
+                object: Some(source.form as u32),
+                part: source.part as u32,
                 depth: depth.lane(lane).to_f64() as f32,
                 normal: [axis(normal.x), axis(normal.y), axis(normal.z)],
                 reflects: world.depth > 0 && bsdf.reflection.is_some() && (front || bsdf.two_sided),

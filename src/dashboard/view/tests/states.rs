@@ -157,6 +157,7 @@ fn probing(model: &mut Model) {
         difference: Some([0.012, 0.01, 0.004]),
         tile_rmse_levels: Some(0.84),
         error_shares: Vec::new(),
+        tile_errors: Vec::new(),
     });
 }
 
