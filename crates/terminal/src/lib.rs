@@ -39,6 +39,7 @@ pub use clipboard::copied;
 pub use decode::Decoder;
 pub use hyperlink::hyperlink;
 pub use input_reader::{InputReader, TimedEvent};
+pub use restorer::supervised;
 pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};
 pub use signals::{HUNG_UP, INTERRUPTED, SignalEvent, SignalQueue, Signals, is_in_foreground};
 
