@@ -43,7 +43,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use zerkalo_scene::value::{nearest, sanitized};
 use zerkalo_scene::{Document, Scene, SceneErrors};
-use zerkalo_terminal::{INTERRUPTED, SignalQueue, Signals, is_in_foreground};
+use zerkalo_terminal::{INTERRUPTED, SignalQueue, Signals, is_in_foreground, supervised};
 use zerkalo_world::{self as world, Precision, requires_double};
 
 /// Exit status for an invalid command line, also that of clap.
@@ -76,6 +76,10 @@ pub fn main() -> ExitCode {
     let started = Instant::now();
     let cli = parse_command_line();
     QUIET.store(cli.quiet, Ordering::Relaxed);
+    let has_dashboard = matches!(cli.command, None | Some(Command::Watch(_)));
+    if let Ok(Some(status)) = if has_dashboard { supervised() } else { Ok(None) } {
+        return ExitCode::from(status);
+    }
     let result = match &cli.command {
         Some(Command::Render(args)) => render::run(args, started),
         Some(Command::Plan(args)) => plan::run(args),

@@ -46,8 +46,8 @@ fn suspend_and_resume(stop: impl Fn(&mut Terminal)) {
     terminal.send("u");
     terminal.wait_until_gone("room.toml ●");
     terminal.send("q");
-    // The program discards input that arrives before the shell's prompt, such as late replies of
-    // the terminal. The test waits for the prompt.
+    // The program reads input that arrives before the shell's prompt, such as late replies of the
+    // terminal. The test waits for the prompt.
     terminal.wait_for("the prompt again", |screen| {
         screen.contents().trim_end().ends_with("shell>").then_some(())
     });
@@ -73,20 +73,43 @@ fn sigtstp_restores_the_terminal_first() {
     });
 }
 
-/// Checks that the terminal is restored after the end of a session's leader, as in `ssh -t host
-/// zerkalo`, which has no controlling terminal then.
+/// Checks that the leader of a session, as in `ssh -t host zerkalo`, ends only after the terminal is
+/// restored. sshd transmits nothing after its end.
 #[test]
-fn killed_leader_of_a_session_restores_the_terminal() {
-    for name in ["KILL", "ABRT"] {
+fn killed_dashboard_of_a_session_restores_the_terminal() {
+    for (name, status) in [("KILL", 137), ("ABRT", 134)] {
         let fixture = Fixture::with_room();
-        let terminal = fixture.open(&["room.toml"], [100, 30]);
+        let mut terminal = fixture.open(&["room.toml"], [100, 30]);
         wait_for_picture(&terminal);
         signal(name, terminal.process_id());
+        assert_eq!(terminal.status(), status);
         terminal.wait_for("the restored terminal", |screen| {
             (!screen.alternate_screen() && !screen.hide_cursor()).then_some(())
         });
-        assert!(is_left(&terminal), "{name}");
+        terminal.end();
     }
+}
+
+/// Checks that a reply that arrives after the key `q` is not typed into the shell.
+#[test]
+fn late_reply_is_not_typed_into_the_shell() {
+    let fixture = Fixture::with_room();
+    let mut terminal = shell(&fixture);
+    terminal.wait_for_text("shell> ");
+    terminal.send("\"$ZERKALO\" room.toml\n");
+    wait_for_picture(&terminal);
+    terminal.set_replying(false);
+    terminal.send("q");
+    terminal.wait_for("the shell", |screen| (!screen.alternate_screen()).then_some(()));
+    terminal.send("\x1b[0n\x1b[?62;22c");
+    terminal.wait_for("the prompt again", |screen| {
+        screen.contents().trim_end().ends_with("shell>").then_some(())
+    });
+    terminal.send("echo $((6 * 7))\n");
+    terminal.wait_for_text("42");
+    assert!(!terminal.screen(vt100::Screen::contents).contains("62;22"));
+    terminal.send("exit\n");
+    terminal.end();
 }
 
 #[test]

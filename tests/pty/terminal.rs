@@ -235,9 +235,15 @@ impl Terminal {
         self.master.as_ref().expect("a master end").resize(pty_size(size)).unwrap();
     }
 
-    /// Returns the process number of the program.
+    /// Returns the process number of the program. Its dashboard is a child process with the same
+    /// executable if the program leads the session.
     pub fn process_id(&self) -> u32 {
-        self.child.process_id().expect("a process")
+        let leader = self.child.process_id().expect("a process");
+        let children = std::fs::read_to_string(format!("/proc/{leader}/task/{leader}/children"));
+        let children = children.unwrap_or_default();
+        let executable = |id: u32| std::fs::read_link(format!("/proc/{id}/exe")).ok();
+        let mut children = children.split_whitespace().filter_map(|id| id.parse().ok());
+        children.find(|id| executable(*id) == executable(leader)).unwrap_or(leader)
     }
 
     /// Waits for the end of the program. Returns its exit status.

@@ -41,6 +41,7 @@ pub use decode::Decoder;
 pub use download::{file_transfer, stores_files};
 pub use hyperlink::hyperlink;
 pub use input_reader::{InputReader, TimedEvent};
+pub use restorer::supervised;
 pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};
 pub use signals::{HUNG_UP, INTERRUPTED, SignalEvent, SignalQueue, Signals, is_in_foreground};
 

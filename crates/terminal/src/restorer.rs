@@ -5,9 +5,13 @@
 //! closes. Signal handlers cannot replace it: SIGKILL has none, and the process ends as soon as the
 //! handler of SIGABRT returns.
 
-use crate::LEAVE;
+use crate::signals::{SIGNALLED, SignalQueue};
+use crate::{LEAVE, screen};
+use rustix::process::{Pid, Signal, getpid, getsid, kill_process};
+use rustix::termios::tcgetattr;
+use std::env;
 use std::io::{self, Write};
-use std::os::unix::process::CommandExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, ChildStdin, Command, Stdio};
 
 /// Script of the helper process. `$0` is [`LEAVE`], and `$1` the modes in the format of `stty -g`. A
@@ -44,6 +48,30 @@ impl Restorer {
         let messages = shell.stdin.take().ok_or(io::ErrorKind::BrokenPipe)?;
         Ok(Self { shell, messages })
     }
+}
+
+/// Runs the program again as a child process if this process leads its session, as in `ssh -t host
+/// zerkalo`. sshd closes the terminal when the leader ends, before a [`Restorer`] can write. This
+/// process passes signals on, restores the terminal if a signal ends the child, and returns the exit
+/// status. Returns `None` if it does not lead a session on a terminal.
+///
+/// # Errors
+/// Fails if the program cannot be run again.
+pub fn supervised() -> io::Result<Option<u8>> {
+    let modes = tcgetattr(io::stdin());
+    let (Ok(modes), true) = (modes, getsid(None) == Ok(getpid())) else { return Ok(None) };
+    let signals = SignalQueue::of_terminal()?;
+    let mut child = Command::new(env::current_exe()?).args(env::args_os().skip(1)).spawn()?;
+    let id = Pid::from_child(&child);
+    signals.handle(move |status| {
+        let signal = Signal::from_named_raw(i32::from(status) - SIGNALLED);
+        let _ = signal.map(|signal| kill_process(id, signal));
+    })?;
+    let status = child.wait()?;
+    let Some(signal) = status.signal() else { return Ok(status.code().map(|code| code as u8)) };
+    let _ = screen::set_modes(&modes);
+    let _ = io::stdout().write_all(LEAVE.as_bytes()).and_then(|()| io::stdout().flush());
+    Ok(Some((SIGNALLED + signal) as u8))
 }
 
 impl Drop for Restorer {

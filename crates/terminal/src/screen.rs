@@ -60,7 +60,7 @@ pub fn cell_px() -> Option<[u16; 2]> {
     Some([cell(size.width, size.columns)?, cell(size.height, size.rows)?])
 }
 
-fn set_modes(modes: &Termios) -> io::Result<()> {
+pub(super) fn set_modes(modes: &Termios) -> io::Result<()> {
     let set = retry_on_intr(|| tcsetattr(io::stdin(), OptionalActions::Now, modes));
     set.map_err(io::Error::from)
 }

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::{fs, thread};
 
 /// Number that is added to the number of a signal to form the exit status, as in shells.
-const SIGNALLED: i32 = 128;
+pub(super) const SIGNALLED: i32 = 128;
 
 /// Exit status after the loss of the terminal, equal to the exit status after SIGHUP.
 pub const HUNG_UP: u8 = (SIGNALLED + SIGHUP) as u8;
@@ -47,8 +47,9 @@ impl SignalQueue {
     /// Registers handlers of the signals that concern a program in raw mode. Must be called before
     /// raw mode begins: the default handlers would end the program without leaving raw mode.
     pub fn of_terminal() -> io::Result<Self> {
-        let signals = [SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH, SIGXFSZ];
-        Ok(Self(iterator::Signals::new(signals)?))
+        let ends = [SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGXCPU];
+        let others = [SIGTSTP, SIGCONT, SIGWINCH, SIGXFSZ];
+        Ok(Self(iterator::Signals::new([&ends[..], &others].concat())?))
     }
 
     /// Registers handlers of the signals by which users and batch systems end a program that is not
