@@ -18,11 +18,8 @@ use zerkalo_world::Precision;
 /// A progressive, accumulating ray tracer that lives in a terminal.
 #[derive(Debug, Parser)]
 #[command(version, about, args_conflicts_with_subcommands = true)]
-#[command(
-    after_help = "Without a command the dashboard opens: edit the scene, watch it converge.\n\n\
-                        Exit status: 0 done, 1 failed, 2 wrong usage, 128 plus the number of a \
-                        signal that stopped it (`render` then writes the picture so far)."
-)]
+#[command(after_help = "`--help` lists examples, exit statuses and environment variables.")]
+#[command(after_long_help = TABLES)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -32,6 +29,29 @@ pub struct Cli {
     #[command(flatten)]
     pub edit: EditArgs,
 }
+
+/// Exit statuses and environment variables, as in docs/command-line.md.
+pub const TABLES: &str = "\
+Without a command the dashboard opens: edit the scene, watch it converge.
+
+Examples:
+  zerkalo
+  zerkalo room.toml
+  zerkalo :mirror-room
+  zerkalo render room.toml -o room.png
+
+Exit status:
+  0        done
+  1        failed; `compare`: above the threshold; `info --scene`: another scene
+  2        wrong usage
+  128 + N  stopped by signal N; `render` has written the picture so far
+
+Environment:
+  NO_COLOR, COLORTERM, TERM    colours of the terminal, unless --color is given
+  TMUX, STY, SSH_CONNECTION    multiplexer and connection
+  LC_ALL, LC_CTYPE, LANG       encoding of the terminal
+  XDG_STATE_HOME, HOME         folder of unsaved edits and recent scenes
+  TMPDIR                       folder of the picture that `render -o -` prints";
 
 /// Arguments of `zerkalo` without a subcommand.
 #[derive(Clone, Debug, Args)]
@@ -138,11 +158,13 @@ pub enum Command {
     /// List the built-in scenes, print one or copy it to a file
     Scenes(ScenesArgs),
     /// Write a commented starter scene
+    #[command(after_help = "Example:\n  zerkalo new room.toml && zerkalo room.toml")]
     New {
         /// The scene file to write; must not exist
         file: PathBuf,
     },
     /// Report the capabilities of the terminal and of the connection, and how to improve them
+    #[command(after_help = "Example:\n  zerkalo doctor --json")]
     Doctor(JsonArgs),
 }
 
@@ -150,7 +172,11 @@ pub enum Command {
 #[derive(Clone, Debug, Args)]
 #[command(
     after_help = "Rendering stops at whichever of --spp, --noise, --rmse and --time is reached \
-                        first; with none of them, at --noise 0.5."
+                  first; with none of them, at --noise 0.5.\n\n\
+                  Examples:\n  zerkalo render room.toml -o room.png --noise 0.25\n  \
+                  zerkalo render :lamp -o - --time 10 | display\n  \
+                  sed s/0.3/0.1/ room.toml | zerkalo render - -o clear.exr\n  \
+                  zerkalo render shots/*.toml -o picture-%04d.png -n"
 )]
 pub struct RenderArgs {
     /// The scene file; - for stdin, :NAME for a built-in scene (`zerkalo scenes` lists them)
@@ -178,7 +204,7 @@ pub struct RenderArgs {
     /// Stop at this estimated RMSE of the linear picture
     #[arg(long, value_name = "LINEAR", value_parser = positive, allow_negative_numbers = true)]
     pub rmse: Option<f64>,
-    /// Stop after this many seconds of rendering
+    /// Stop in time to have written the picture after this many seconds
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub time: Option<f64>,
     #[command(flatten)]
@@ -234,7 +260,8 @@ pub struct RenderArgs {
     after_help = "The pilot, an adaptive render to a coarser noise, decides how many samples each \
                         tile gets. Its samples are part of the picture: they are the base, shard \
                         0. Trace each of the shards K = 1..N by\n  zerkalo render SCENE --plan FILE \
-                        --shard K -o part-K.zk\nand merge base and parts by `zerkalo merge`."
+                        --shard K -o part-K.zk\nand merge base and parts by `zerkalo merge`.\n\n\
+                  Example:\n  zerkalo plan room.toml --shards 8 --noise 0.1 -o job.plan"
 )]
 pub struct PlanArgs {
     /// The scene file
@@ -275,6 +302,8 @@ pub struct PlanArgs {
 
 /// Arguments of `zerkalo merge`.
 #[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:\n  zerkalo merge job.plan -o room.png\n  \
+                  zerkalo merge job-*.zk -o room.zk --partial")]
 pub struct MergeArgs {
     /// The plan, which stands for the film files of its shards beside it: job.plan for job-0.zk,
     /// job-1.zk and so on; or film files in any order
@@ -297,6 +326,7 @@ pub struct MergeArgs {
 
 /// Arguments of `zerkalo measure`.
 #[derive(Clone, Debug, Args)]
+#[command(after_help = "Example:\n  zerkalo measure room.toml --seconds 20 --plot room.svg")]
 pub struct MeasureArgs {
     /// The scene file
     pub scene: PathBuf,
@@ -338,7 +368,8 @@ pub struct MeasureArgs {
 #[command(
     after_help = "Shows the sum of the samples, its noise, and the files that are late or missing. \
                         The files are read again when they are replaced. Nothing is edited or \
-                        rendered; `p` and `P` write the picture, `q` quits."
+                        rendered; `p` and `P` write the picture, `q` quits.\n\n\
+                  Example:\n  zerkalo watch job.plan"
 )]
 pub struct WatchArgs {
     /// Film files of the shards of one plan, or one checkpoint; a plan file stands for the film
@@ -351,6 +382,8 @@ pub struct WatchArgs {
 
 /// Arguments of `zerkalo check`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  zerkalo check room.toml\n  \
+                  zerkalo check --json room.toml | jq '.errors[].line'")]
 pub struct CheckArgs {
     /// The scene file; - for stdin
     pub scene: PathBuf,
@@ -360,6 +393,8 @@ pub struct CheckArgs {
 
 /// Arguments of `zerkalo compare`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  zerkalo compare before.png after.png -o difference.png\n  \
+                  zerkalo compare reference.exr new.exr --threshold 1")]
 pub struct CompareArgs {
     /// A PNG or OpenEXR picture
     pub a: PathBuf,
@@ -377,6 +412,8 @@ pub struct CompareArgs {
 
 /// Arguments of `zerkalo scenes`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  zerkalo scenes\n  zerkalo scenes lamp mine.toml\n  \
+                  zerkalo scenes lamp | zerkalo render - -o lamp.png")]
 pub struct ScenesArgs {
     /// The scene to print
     pub name: Option<String>,
@@ -387,6 +424,7 @@ pub struct ScenesArgs {
 
 /// Arguments of `zerkalo info`.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  zerkalo info room.png --scene room.toml")]
 pub struct InfoArgs {
     /// A PNG, OpenEXR, checkpoint or plan file
     pub file: PathBuf,

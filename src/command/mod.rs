@@ -5,6 +5,7 @@ mod check;
 mod checkpoints;
 mod compare;
 mod cpu;
+mod deadline;
 mod doctor;
 mod edit;
 mod info;
