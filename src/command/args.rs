@@ -19,7 +19,7 @@ use zerkalo_world::Precision;
 #[derive(Debug, Parser)]
 #[command(version, about, args_conflicts_with_subcommands = true)]
 #[command(after_help = "`--help` lists examples, exit statuses and environment variables.")]
-#[command(after_long_help = TABLES)]
+#[command(after_long_help = include_str!("help/zerkalo.txt").trim_end())]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -29,29 +29,6 @@ pub struct Cli {
     #[command(flatten)]
     pub edit: EditArgs,
 }
-
-/// Exit statuses and environment variables, as in docs/command-line.md.
-pub const TABLES: &str = "\
-Without a command the dashboard opens: edit the scene, watch it converge.
-
-Examples:
-  zerkalo
-  zerkalo room.toml
-  zerkalo :mirror-room
-  zerkalo render room.toml -o room.png
-
-Exit status:
-  0        done
-  1        failed; `compare`: above the threshold; `info --scene`: another scene
-  2        wrong usage
-  128 + N  stopped by signal N; `render` has written the picture so far
-
-Environment:
-  NO_COLOR, COLORTERM, TERM    colours of the terminal, unless --color is given
-  TMUX, STY, SSH_CONNECTION    multiplexer and connection
-  LC_ALL, LC_CTYPE, LANG       encoding of the terminal
-  XDG_STATE_HOME, HOME         folder of unsaved edits and recent scenes
-  TMPDIR                       folder of the picture that `render -o -` prints";
 
 /// Arguments of `zerkalo` without a subcommand.
 #[derive(Clone, Debug, Args)]
@@ -158,26 +135,19 @@ pub enum Command {
     /// List the built-in scenes, print one or copy it to a file
     Scenes(ScenesArgs),
     /// Write a commented starter scene
-    #[command(after_help = "Example:\n  zerkalo new room.toml && zerkalo room.toml")]
+    #[command(after_help = include_str!("help/new.txt").trim_end())]
     New {
         /// The scene file to write; must not exist
         file: PathBuf,
     },
     /// Report the capabilities of the terminal and of the connection, and how to improve them
-    #[command(after_help = "Example:\n  zerkalo doctor --json")]
+    #[command(after_help = include_str!("help/doctor.txt").trim_end())]
     Doctor(JsonArgs),
 }
 
 /// Arguments of `zerkalo render`.
 #[derive(Clone, Debug, Args)]
-#[command(
-    after_help = "Rendering stops at whichever of --spp, --noise, --rmse and --time is reached \
-                  first; with none of them, at --noise 0.5.\n\n\
-                  Examples:\n  zerkalo render room.toml -o room.png --noise 0.25\n  \
-                  zerkalo render :lamp -o - --time 10 | display\n  \
-                  sed s/0.3/0.1/ room.toml | zerkalo render - -o clear.exr\n  \
-                  zerkalo render shots/*.toml -o picture-%04d.png -n"
-)]
+#[command(after_help = include_str!("help/render.txt").trim_end())]
 pub struct RenderArgs {
     /// The scene file; - for stdin, :NAME for a built-in scene (`zerkalo scenes` lists them)
     pub scene: PathBuf,
@@ -256,13 +226,7 @@ pub struct RenderArgs {
 
 /// Arguments of `zerkalo plan`.
 #[derive(Clone, Debug, Args)]
-#[command(
-    after_help = "The pilot, an adaptive render to a coarser noise, decides how many samples each \
-                        tile gets. Its samples are part of the picture: they are the base, shard \
-                        0. Trace each of the shards K = 1..N by\n  zerkalo render SCENE --plan FILE \
-                        --shard K -o part-K.zk\nand merge base and parts by `zerkalo merge`.\n\n\
-                  Example:\n  zerkalo plan room.toml --shards 8 --noise 0.1 -o job.plan"
-)]
+#[command(after_help = include_str!("help/plan.txt").trim_end())]
 pub struct PlanArgs {
     /// The scene file
     #[arg(required_unless_present = "from", conflicts_with = "from")]
@@ -302,8 +266,7 @@ pub struct PlanArgs {
 
 /// Arguments of `zerkalo merge`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Examples:\n  zerkalo merge job.plan -o room.png\n  \
-                  zerkalo merge job-*.zk -o room.zk --partial")]
+#[command(after_help = include_str!("help/merge.txt").trim_end())]
 pub struct MergeArgs {
     /// The plan, which stands for the film files of its shards beside it: job.plan for job-0.zk,
     /// job-1.zk and so on; or film files in any order
@@ -326,7 +289,7 @@ pub struct MergeArgs {
 
 /// Arguments of `zerkalo measure`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example:\n  zerkalo measure room.toml --seconds 20 --plot room.svg")]
+#[command(after_help = include_str!("help/measure.txt").trim_end())]
 pub struct MeasureArgs {
     /// The scene file
     pub scene: PathBuf,
@@ -365,12 +328,7 @@ pub struct MeasureArgs {
 
 /// Arguments of `zerkalo watch`.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Shows the sum of the samples, its noise, and the files that are late or missing. \
-                        The files are read again when they are replaced. Nothing is edited or \
-                        rendered; `p` and `P` write the picture, `q` quits.\n\n\
-                  Example:\n  zerkalo watch job.plan"
-)]
+#[command(after_help = include_str!("help/watch.txt").trim_end())]
 pub struct WatchArgs {
     /// Film files of the shards of one plan, or one checkpoint; a plan file stands for the film
     /// files beside it (job.plan: job-0.zk, job-1.zk, ..)
@@ -382,8 +340,7 @@ pub struct WatchArgs {
 
 /// Arguments of `zerkalo check`.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  zerkalo check room.toml\n  \
-                  zerkalo check --json room.toml | jq '.errors[].line'")]
+#[command(after_help = include_str!("help/check.txt").trim_end())]
 pub struct CheckArgs {
     /// The scene file; - for stdin
     pub scene: PathBuf,
@@ -393,8 +350,7 @@ pub struct CheckArgs {
 
 /// Arguments of `zerkalo compare`.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  zerkalo compare before.png after.png -o difference.png\n  \
-                  zerkalo compare reference.exr new.exr --threshold 1")]
+#[command(after_help = include_str!("help/compare.txt").trim_end())]
 pub struct CompareArgs {
     /// A PNG or OpenEXR picture
     pub a: PathBuf,
@@ -412,8 +368,7 @@ pub struct CompareArgs {
 
 /// Arguments of `zerkalo scenes`.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  zerkalo scenes\n  zerkalo scenes lamp mine.toml\n  \
-                  zerkalo scenes lamp | zerkalo render - -o lamp.png")]
+#[command(after_help = include_str!("help/scenes.txt").trim_end())]
 pub struct ScenesArgs {
     /// The scene to print
     pub name: Option<String>,
@@ -424,7 +379,7 @@ pub struct ScenesArgs {
 
 /// Arguments of `zerkalo info`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  zerkalo info room.png --scene room.toml")]
+#[command(after_help = include_str!("help/info.txt").trim_end())]
 pub struct InfoArgs {
     /// A PNG, OpenEXR, checkpoint or plan file
     pub file: PathBuf,

@@ -47,7 +47,8 @@ impl Deadline {
     /// Reserves the time to write the picture, once there is one: that of a trial, which writes it
     /// to a temporary file.
     pub fn reserve(&mut self, session: &Session) {
-        let Some((mut output, depth, provenance)) = self.trial.take() else { return };
+        let trial = self.trial.take().filter(|_| !self.left().is_zero());
+        let Some((mut output, depth, provenance)) = trial else { return };
         let start = Instant::now();
         let folder = output.path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let mut builder = tempfile::Builder::new();
