@@ -19,11 +19,8 @@ use zerkalo_world::Precision;
 /// A progressive, accumulating ray tracer that lives in a terminal.
 #[derive(Debug, Parser)]
 #[command(version, about, args_conflicts_with_subcommands = true)]
-#[command(
-    after_help = "Without a command the dashboard opens: edit the scene, watch it converge.\n\n\
-                        Exit status: 0 done, 1 failed, 2 wrong usage, 128 plus the number of a \
-                        signal that stopped it (`render` then writes the picture so far)."
-)]
+#[command(after_help = "`--help` lists examples, exit statuses and environment variables.")]
+#[command(after_long_help = include_str!("help/zerkalo.txt").trim_end())]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -140,11 +137,13 @@ pub enum Command {
     /// List the built-in scenes, print one or copy it to a file
     Scenes(ScenesArgs),
     /// Write a commented starter scene
+    #[command(after_help = include_str!("help/new.txt").trim_end())]
     New {
         /// The scene file to write; must not exist
         file: PathBuf,
     },
     /// Report the capabilities of the terminal and of the connection, and how to improve them
+    #[command(after_help = include_str!("help/doctor.txt").trim_end())]
     Doctor(JsonArgs),
     /// Print options, keys and colours in force, as a configuration file
     Config,
@@ -152,10 +151,7 @@ pub enum Command {
 
 /// Arguments of `zerkalo render`.
 #[derive(Clone, Debug, Args)]
-#[command(
-    after_help = "Rendering stops at whichever of --spp, --noise, --rmse, --error and --time is \
-                        reached first; with none of them, at --noise 0.5."
-)]
+#[command(after_help = include_str!("help/render.txt").trim_end())]
 pub struct RenderArgs {
     /// The scene file; - for stdin, :NAME for a built-in scene (`zerkalo scenes` lists them)
     pub scene: PathBuf,
@@ -186,7 +182,7 @@ pub struct RenderArgs {
     /// 8 bits together. Chooses double precision where single is not enough
     #[arg(long, value_name = "LEVELS", value_parser = positive, conflicts_with_all = ["noise", "rmse", "memory"], allow_negative_numbers = true)]
     pub error: Option<f64>,
-    /// Stop after this many seconds of rendering
+    /// Stop in time to have written the picture after this many seconds
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub time: Option<f64>,
     #[command(flatten)]
@@ -238,12 +234,7 @@ pub struct RenderArgs {
 
 /// Arguments of `zerkalo plan`.
 #[derive(Clone, Debug, Args)]
-#[command(
-    after_help = "The pilot, an adaptive render to a coarser noise, decides how many samples each \
-                        tile gets. Its samples are part of the picture: they are the base, shard \
-                        0. Trace each of the shards K = 1..N by\n  zerkalo render SCENE --plan FILE \
-                        --shard K -o part-K.zk\nand merge base and parts by `zerkalo merge`."
-)]
+#[command(after_help = include_str!("help/plan.txt").trim_end())]
 pub struct PlanArgs {
     /// The scene file
     #[arg(required_unless_present = "from", conflicts_with = "from")]
@@ -283,6 +274,7 @@ pub struct PlanArgs {
 
 /// Arguments of `zerkalo merge`.
 #[derive(Clone, Debug, Args)]
+#[command(after_help = include_str!("help/merge.txt").trim_end())]
 pub struct MergeArgs {
     /// The plan, which stands for the film files of its shards beside it: job.plan for job-0.zk,
     /// job-1.zk and so on; or film files in any order
@@ -305,6 +297,7 @@ pub struct MergeArgs {
 
 /// Arguments of `zerkalo measure`.
 #[derive(Clone, Debug, Args)]
+#[command(after_help = include_str!("help/measure.txt").trim_end())]
 pub struct MeasureArgs {
     /// The scene file
     pub scene: PathBuf,
@@ -343,11 +336,7 @@ pub struct MeasureArgs {
 
 /// Arguments of `zerkalo watch`.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Shows the sum of the samples, its noise, and the files that are late or missing. \
-                        The files are read again when they are replaced. Nothing is edited or \
-                        rendered; `p` and `P` write the picture, `q` quits."
-)]
+#[command(after_help = include_str!("help/watch.txt").trim_end())]
 pub struct WatchArgs {
     /// Film files of the shards of one plan, or one checkpoint; a plan file stands for the film
     /// files beside it (job.plan: job-0.zk, job-1.zk, ..)
@@ -359,6 +348,7 @@ pub struct WatchArgs {
 
 /// Arguments of `zerkalo check`.
 #[derive(Debug, Args)]
+#[command(after_help = include_str!("help/check.txt").trim_end())]
 pub struct CheckArgs {
     /// The scene file; - for stdin
     pub scene: PathBuf,
@@ -368,6 +358,7 @@ pub struct CheckArgs {
 
 /// Arguments of `zerkalo compare`.
 #[derive(Debug, Args)]
+#[command(after_help = include_str!("help/compare.txt").trim_end())]
 pub struct CompareArgs {
     /// A PNG or OpenEXR picture
     pub a: PathBuf,
@@ -385,6 +376,7 @@ pub struct CompareArgs {
 
 /// Arguments of `zerkalo scenes`.
 #[derive(Debug, Args)]
+#[command(after_help = include_str!("help/scenes.txt").trim_end())]
 pub struct ScenesArgs {
     /// The scene to print
     pub name: Option<String>,
@@ -395,6 +387,7 @@ pub struct ScenesArgs {
 
 /// Arguments of `zerkalo info`.
 #[derive(Debug, Args)]
+#[command(after_help = include_str!("help/info.txt").trim_end())]
 pub struct InfoArgs {
     /// A PNG, OpenEXR, checkpoint or plan file
     pub file: PathBuf,

@@ -2,55 +2,18 @@
 
 use crate::command::args::CheckArgs;
 use crate::command::{Failure, print_json, print_line, scene_or_errors, warn, warn_of_doubts};
-use serde::Serialize;
+use serde_json::{Value, json};
 use zerkalo_render::memory_budget;
 use zerkalo_scene::Diagnostic;
 use zerkalo_world::{self as world, AnyWorld};
-
-/// Results of `--json`. docs/command-line.md describes the keys.
-#[derive(Serialize)]
-struct Checked<'a> {
-    valid: bool,
-    scene: String,
-    size: [u32; 2],
-    contains: &'a str,
-    lights: &'a [String],
-    memory_bytes: u64,
-    warnings: Vec<String>,
-    biased: &'a [String],
-}
-
-/// Results of `--json` for a scene with errors.
-#[derive(Serialize)]
-struct Invalid<'a> {
-    valid: bool,
-    errors: Vec<SceneError<'a>>,
-}
-
-#[derive(Serialize)]
-struct SceneError<'a> {
-    line: Option<usize>,
-    column: Option<usize>,
-    subject: &'a str,
-    found: &'a str,
-    help: &'a str,
-}
-
-impl<'a> SceneError<'a> {
-    fn of(message: &'a Diagnostic) -> Self {
-        let (line, column) = message.line_column.unzip();
-        let Diagnostic { subject, found, help, .. } = message;
-        Self { line, column, subject, found, help }
-    }
-}
 
 pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let document = match scene_or_errors(&args.scene)? {
         Ok(document) => document,
         Err(errors) => {
             if args.json.json {
-                let errors = errors.messages.iter().map(SceneError::of).collect();
-                print_json(&Invalid { valid: false, errors })?;
+                let errors: Vec<_> = errors.messages.iter().map(error_json).collect();
+                print_json(&json!({"valid": false, "errors": errors}))?;
             }
             return Err(Failure::Failed(errors.with_excerpts()));
         }
@@ -65,25 +28,31 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
         warn(&format!("warning: {reason}."));
         warnings.push(reason.to_string());
     }
-    let checked = Checked {
-        valid: true,
-        scene: args.scene.display().to_string(),
-        size,
-        contains: &world.info().inventory,
-        lights: &groups,
-        memory_bytes: memory_budget::needed(size, groups.len()),
-        warnings,
-        biased: &world.info().biases,
-    };
+    let info = world.info();
+    let bytes = memory_budget::needed(size, groups.len());
     if args.json.json {
-        return print_json(&checked);
+        return print_json(&json!({
+            "valid": true,
+            "scene": args.scene.display().to_string(),
+            "size": size,
+            "contains": &*info.inventory,
+            "lights": groups,
+            "memory_bytes": bytes,
+            "warnings": warnings,
+            "biased": info.biases,
+        }));
     }
-    let Checked { scene, size: [width, height], contains, memory_bytes, .. } = &checked;
-    print_line(&format!("{scene}: valid"))?;
-    print_line(&format!("  contains  {contains}"))?;
+    let [width, height] = size;
+    print_line(&format!("{}: valid", args.scene.display()))?;
+    print_line(&format!("  contains  {}", info.inventory))?;
     print_line(&format!("  picture   {width} x {height} pixels"))?;
     print_line(&format!("  lights    {} separate: {}", groups.len(), groups.join(", ")))?;
-    let megabytes = (*memory_bytes as f64 * 1e-6).max(1.0);
-    print_line(&format!("  memory    {megabytes:.0} MB for the samples"))?;
-    checked.biased.iter().try_for_each(|bias| print_line(&format!("  biased    {bias}")))
+    print_line(&format!("  memory    {:.0} MB for the samples", (bytes as f64 * 1e-6).max(1.0)))?;
+    info.biases.iter().try_for_each(|bias| print_line(&format!("  biased    {bias}")))
+}
+
+fn error_json(message: &Diagnostic) -> Value {
+    let (line, column) = message.line_column.unzip();
+    let Diagnostic { subject, found, help, .. } = message;
+    json!({"line": line, "column": column, "subject": subject, "found": found, "help": help})
 }

@@ -2,7 +2,7 @@
 
 use crate::command::args::InfoArgs;
 use crate::command::{Failure, print_json, print_line, read_scene};
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 use zerkalo_render::SampleInputs;
@@ -24,7 +24,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         }
     }
     if args.json.json {
-        return print_json(&Origin::of(&origin, &args.file)).and_then(|()| match &args.scene {
+        return print_json(&results(&origin, &args.file)).and_then(|()| match &args.scene {
             Some(path) => compare(&origin, path, args).map(drop),
             None => Ok(()),
         });
@@ -45,30 +45,17 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
 }
 
-/// Results of `--json`. docs/command-line.md describes the keys.
-#[derive(Serialize)]
-struct Origin<'a> {
-    file: String,
-    format: &'a str,
-    size: [usize; 2],
-    noise_levels: Option<f64>,
-    rmse_linear: Option<f64>,
-    metadata: BTreeMap<&'a str, &'a str>,
-}
-
-impl<'a> Origin<'a> {
-    fn of(metadata: &'a FileMetadata, file: &Path) -> Self {
-        let noise = metadata.get("Noise").and_then(noise_of_text);
-        let entries = metadata.entries.iter();
-        Self {
-            file: file.display().to_string(),
-            format: metadata.format,
-            size: metadata.size,
-            noise_levels: noise.map(|noise| noise.levels),
-            rmse_linear: noise.map(|noise| noise.linear),
-            metadata: entries.map(|(key, value)| (key.as_str(), value.as_str())).collect(),
-        }
-    }
+/// Returns the results of `--json`. docs/command-line.md describes the keys.
+fn results(origin: &FileMetadata, file: &Path) -> Value {
+    let noise = origin.get("Noise").and_then(noise_of_text);
+    json!({
+        "file": file.display().to_string(),
+        "format": origin.format,
+        "size": origin.size,
+        "noise_levels": noise.map(|noise| noise.levels),
+        "rmse_linear": noise.map(|noise| noise.linear),
+        "metadata": origin.entries.iter().cloned().collect::<BTreeMap<_, _>>(),
+    })
 }
 
 /// Returns the description of a plan, in the form of a file's metadata.

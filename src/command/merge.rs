@@ -3,7 +3,7 @@
 use crate::command::args::MergeArgs;
 use crate::command::part_file::{self, FilmOutput};
 use crate::command::{Failure, on_signal, print_json, print_line, save};
-use serde::Serialize;
+use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use zerkalo_render::export::update_metadata;
@@ -28,16 +28,16 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let plan = &merged.part.plan;
     let path = args.output.display();
     if args.json.json {
-        return print_json(&MergeResults {
-            output: path.to_string(),
-            spp_min: report.spp.min,
-            spp_mean: report.spp.mean,
-            spp_max: report.spp.max,
-            noise_levels: report.noise.map(|noise| noise.rmse.levels),
-            rmse_linear: report.noise.map(|noise| noise.rmse.linear),
-            rays: merged.part.rays,
-            missing: merged.part.missing(),
-        });
+        return print_json(&json!({
+            "output": path.to_string(),
+            "spp_min": report.spp.min,
+            "spp_mean": report.spp.mean,
+            "spp_max": report.spp.max,
+            "noise_levels": report.noise.map(|noise| noise.rmse.levels),
+            "rmse_linear": report.noise.map(|noise| noise.rmse.linear),
+            "rays": merged.part.rays,
+            "missing": merged.part.missing(),
+        }));
     }
     print_line(&format!("{path}  {}  {} rays", part_file::summary(&report), merged.part.rays))?;
     if let Some(missing) = merged.part.missing() {
@@ -57,19 +57,6 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         ))?;
     }
     Ok(())
-}
-
-/// Results of `--json`. docs/command-line.md describes the keys.
-#[derive(Serialize)]
-struct MergeResults {
-    output: String,
-    spp_min: u32,
-    spp_mean: f64,
-    spp_max: u32,
-    noise_levels: Option<f64>,
-    rmse_linear: Option<f64>,
-    rays: u64,
-    missing: Option<String>,
 }
 
 /// Formats the noise of the merged picture, which lacks shards, and the noise predicted for all

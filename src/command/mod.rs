@@ -6,6 +6,7 @@ mod checkpoints;
 mod compare;
 mod config;
 mod cpu;
+mod deadline;
 mod doctor;
 mod edit;
 mod info;
@@ -75,6 +76,12 @@ impl<E: Display> From<E> for Failure {
 pub fn main() -> ExitCode {
     let started = Instant::now();
     let cli = parse_command_line();
+    if let (None, Some(scene)) = (&cli.command, &cli.edit.scene)
+        && !scene.exists()
+        && let (error, true) = unknown_command(&scene.to_string_lossy())
+    {
+        end(&error)
+    }
     QUIET.store(cli.quiet, Ordering::Relaxed);
     let has_dashboard = matches!(cli.command, None | Some(Command::Watch(_)));
     if let Ok(Some(status)) = if has_dashboard { supervised() } else { Ok(None) } {
@@ -120,15 +127,20 @@ fn parse_command_line() -> Cli {
         let unknown = !first.starts_with('-') && Cli::command().find_subcommand(&*first).is_none();
         let kinds = [ErrorKind::ArgumentConflict, ErrorKind::UnknownArgument];
         if kinds.contains(&error.kind()) && unknown && !Path::new(&*first).exists() {
-            let command = Cli::command();
-            let names: Vec<_> = command.get_subcommands().map(clap::Command::get_name).collect();
-            let near = nearest(&first, names.iter().copied());
-            let near = near.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
-            let message = format!("`{first}` is no command{near}; commands: {}", names.join(", "));
-            end(&Cli::command().error(ErrorKind::InvalidSubcommand, message))
+            end(&unknown_command(&first).0)
         }
         end(&error)
     })
+}
+
+/// Returns the error about `given`, which is no command, and `true` if it is a mistyped one.
+fn unknown_command(given: &str) -> (clap::Error, bool) {
+    let mut command = Cli::command();
+    let names: Vec<_> = command.get_subcommands().map(|c| c.get_name().to_string()).collect();
+    let near = nearest(given, names.iter().map(String::as_str));
+    let hint = near.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
+    let message = format!("`{given}` is no command{hint}\nCommands: {}", names.join(", "));
+    (command.error(ErrorKind::InvalidSubcommand, message), near.is_some())
 }
 
 /// Prints a usage error, the help or the version, and ends the program.

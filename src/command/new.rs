@@ -11,7 +11,10 @@ const STARTER: &str = include_str!("starter.toml");
 pub fn run(path: &Path) -> Result<(), Failure> {
     replace_file(path, Existing::Refuse, |file| file.write_all(STARTER.as_bytes())).map(drop)?;
     let shown = path.display();
-    print_line(&format!("{shown} written; `zerkalo render {shown} -o PICTURE.png` renders it"))
+    print_line(&format!(
+        "{shown} written; `zerkalo {shown}` opens it in the dashboard, `zerkalo render {shown} -o \
+         PICTURE.png` renders it"
+    ))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use crate::command::{
     Failure, is_quiet, print_json, print_line, read_scene_and_warn, warn_of_precision,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget};
-use serde::Serialize;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zerkalo_kernel::sampling::SampleSettings;
@@ -37,15 +37,15 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     let most = shards.iter().copied().fold(0.0, f64::max);
     let total: f64 = rays.iter().sum();
     if args.json.json {
-        return print_json(&Planned {
-            plan: args.output.display().to_string(),
-            shards: plan.settings.shards,
-            spp: plan.spp(),
-            noise_levels: plan.predicted_levels,
-            rays: total,
-            base_rays: base[0],
-            largest_shard_rays: most,
-        });
+        return print_json(&json!({
+            "plan": args.output.display().to_string(),
+            "shards": plan.settings.shards,
+            "spp": plan.spp(),
+            "noise_levels": plan.predicted_levels,
+            "rays": total,
+            "base_rays": base[0],
+            "largest_shard_rays": most,
+        }));
     }
     print_line(&format!(
         "{}  {} shards  {:.0} spp  expected noise {:.3} 8-bit levels",
@@ -59,18 +59,6 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
         100.0 * base[0] / total,
         100.0 * most / total
     ))
-}
-
-/// Results of `--json`. docs/command-line.md describes the keys.
-#[derive(Serialize)]
-struct Planned {
-    plan: String,
-    shards: u32,
-    spp: f64,
-    noise_levels: f64,
-    rays: f64,
-    base_rays: f64,
-    largest_shard_rays: f64,
 }
 
 /// Renders the pilot, an adaptive render to a coarser noise, and plans the remaining samples.

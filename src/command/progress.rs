@@ -1,6 +1,6 @@
 //! Progress of a render on stderr: a bar in a terminal, otherwise lines for a log.
 
-use crate::command::is_quiet;
+use crate::command::{is_quiet, warn};
 use crate::dashboard::text::durations;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
@@ -56,6 +56,14 @@ impl Progress {
                     + report.seconds.clamp(FIRST_LINE_SECONDS, LONGEST_INTERVAL_SECONDS);
             }
             Self::Lines(_) => {}
+        }
+    }
+
+    /// Prints a line beside the progress.
+    pub fn note(&self, line: &str) {
+        match self {
+            Self::Bar(Some(bar)) => bar.println(line),
+            Self::Bar(None) | Self::Lines(_) => warn(line),
         }
     }
 

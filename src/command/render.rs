@@ -2,6 +2,7 @@
 
 use crate::command::args::RenderArgs;
 use crate::command::checkpoints::CheckpointWriter;
+use crate::command::deadline::Deadline;
 use crate::command::progress::{Progress, counts, noise};
 use crate::command::regions::Division;
 use crate::command::{
@@ -247,7 +248,8 @@ fn as_a_whole(
         let interval = Duration::from_secs_f64(args.checkpoint_interval.min(1e9));
         CheckpointWriter::new(claim, interval, provenance.clone())
     });
-    let end = watch(&session, signals, checkpoints.as_mut())?;
+    let deadline = Deadline::new(args, output, &provenance, started);
+    let end = watch(&session, signals, checkpoints.as_mut(), deadline)?;
     // The checkpoint comes first: the picture can be written again from its samples, if the program
     // is killed soon after a signal. Its error is returned after the picture has been written.
     let kept = checkpoints.map_or(Ok(()), |checkpoints| checkpoints.finish(&session));
@@ -315,6 +317,7 @@ fn watch(
     session: &Session,
     signals: &Signals,
     mut checkpoints: Option<&mut CheckpointWriter>,
+    mut deadline: Option<Deadline>,
 ) -> Result<End, Failure> {
     let mut progress = Progress::on_stderr();
     let mut caught = None;
@@ -333,8 +336,19 @@ fn watch(
         if let Some(checkpoints) = &mut checkpoints {
             checkpoints.poll(session);
         }
-        let Some(snapshot) = session.wait(POLL) else { continue };
+        let left = deadline.as_ref().map(Deadline::left);
+        if has_picture && left == Some(Duration::ZERO) {
+            break Ok(Ok(StoppedBy::Time));
+        }
+        let poll = left.map_or(POLL, |left| left.clamp(Duration::from_millis(1), POLL));
+        let Some(snapshot) = session.wait(poll) else { continue };
         has_picture |= snapshot.report.first_picture_seconds.is_some();
+        if let Some(deadline) = deadline.as_mut().filter(|_| has_picture) {
+            deadline.reserve(session);
+            if let Some(forecast) = deadline.forecast(&snapshot.report) {
+                progress.note(&forecast);
+            }
+        }
         match &snapshot.report.state {
             State::Finished(reason) => break Ok(Ok(*reason)),
             State::Failed(reason) => break Err(Failure::Failed(reason.clone())),

@@ -11,6 +11,8 @@ mod scale;
 mod shards;
 #[cfg(unix)]
 pub mod signals;
+#[cfg(unix)]
+mod stories;
 mod watch;
 
 use crate::harness::*;
@@ -249,7 +251,7 @@ fn each_stop_criterion_ends_the_render() {
     assert!(rmse["rmse_linear"].as_f64().unwrap() <= 0.01);
     let time = desk.stats(&["--time", "0.2"]);
     assert_eq!(time["stopped_by"], "time");
-    assert!(time["seconds"].as_f64().unwrap() >= 0.2);
+    assert!(time["total_seconds"].as_f64().unwrap() <= 0.4);
     let default = desk.stats(&[]);
     assert_eq!(default["stopped_by"], "noise");
     assert!(default["noise_levels"].as_f64().unwrap() <= 0.5);
@@ -288,7 +290,6 @@ fn starter_scene_is_valid() {
     let desk = Desk::new();
     let run = desk.run(&["new", "mine.toml"]);
     assert_eq!((run.status, run.err.as_str()), (0, ""));
-    assert!(run.out.contains("zerkalo render mine.toml"));
     let run = desk.run(&["check", "mine.toml"]);
     assert_eq!((run.status, run.err.as_str()), (0, ""));
     for part in ["valid", "contains", "pixels", "lights", "memory"] {

@@ -16,10 +16,6 @@ fn usage_errors_have_status_2_and_touch_nothing() {
         (&["render", "scene.toml", "-o", "a.png", "--spp", "-3"], "-3 is not in 1"),
         (&["render", "scene.toml", "-o", "a.png", "--noise", "0"], "greater than 0"),
         (&["render", "scene.toml", "-o", "a.png", "--stats", "a.png"], "same file"),
-        (
-            &["rendr", "scene.toml"],
-            "`rendr` is no command; did you mean `render`?; commands: render, plan, merge, watch, measure, check, info, compare, scenes, new, doctor",
-        ),
         (&["polish"], "zerkalo render polish"),
         (&[], "zerkalo render"),
     ] {

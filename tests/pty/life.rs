@@ -199,3 +199,11 @@ fn signal_ends_the_capability_query() {
     });
     assert!(is_prompt, "the query goes on after the signal");
 }
+
+#[test]
+fn pictures_are_not_written_to_a_terminal() {
+    let fixture = Fixture::with_room();
+    let (status, bytes) = fixture.open(&["render", "room.toml", "-o", "-"], [80, 24]).end();
+    assert_eq!(status, 2);
+    assert!(bytes.contains("a picture is not written to a terminal"), "{bytes:?}");
+}

@@ -159,7 +159,9 @@ impl SchemaReader<'_> {
         let help = format!("Known: {}.{}", names(fields), Self::intended(key.get_ref(), fields));
         let found = format!("unknown key \"{}\"{}", truncated(key.get_ref()), self.place());
         self.add(key.span(), found, help);
-        nearest(key.get_ref(), known())
+        let is_shape = shape::KINDS.iter().any(|kind| kind.name == key.get_ref().as_ref());
+        let shape = known().find(|name| *name == "shape").filter(|_| is_shape);
+        shape.or_else(|| nearest(key.get_ref(), known()))
     }
 
     /// Returns a sentence with what the unknown key `given` of a table with the keys `fields` was

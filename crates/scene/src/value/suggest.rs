@@ -1,7 +1,7 @@
 //! Suggestions for mistyped words ("Did you mean"): the nearest known word.
 
 use crate::value::truncated;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Returns the word most similar to `given`, if typing errors may explain the difference.
 pub fn nearest<'a>(given: &str, words: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -21,14 +21,12 @@ pub fn did_you_mean<'a>(given: &str, words: impl IntoIterator<Item = &'a str>) -
     word.map_or(String::new(), |word| format!(" Did you mean \"{word}\"?"))
 }
 
-/// Returns the path of the file in the folder of `path` whose name is [`nearest`] to that of `path`
-/// and has the same extension.
+/// Returns the path of the file in the folder of `path` whose name is [`nearest`] to that of `path`.
 pub(crate) fn nearest_file(path: &Path) -> Option<String> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
-    let files = entries.flatten().map(|entry| PathBuf::from(entry.file_name()));
-    let alike = files.filter(|file| file.extension() == path.extension());
-    let mut names: Vec<_> = alike.map(|file| file.to_string_lossy().into_owned()).collect();
+    let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<_> = names.collect();
     names.sort_unstable();
     let near = nearest(&path.file_name()?.to_string_lossy(), names.iter().map(String::as_str))?;
     Some(path.with_file_name(near).display().to_string())
