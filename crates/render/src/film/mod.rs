@@ -7,6 +7,7 @@
 //! multiply the sums of each group by its colour and intensity.
 
 mod box_filter;
+mod captures;
 mod detail;
 mod display;
 mod downsample;
@@ -24,6 +25,8 @@ pub mod testing;
 mod tile;
 
 pub use box_filter::box_means;
+pub(crate) use captures::Stratum;
+pub use captures::{Captures, Class};
 pub use detail::{Detail, Window};
 pub use display::{Display, quantised_16};
 pub use downsample::{IncrementalDownsample, Thumbnail};

@@ -31,15 +31,18 @@
 //! preferred, and the estimate from all pixels is reported. The larger of both estimates would be
 //! too high in this case, by up to 30 % in pictures whose error is in a few pixels.
 //!
+//! Pixels that rare bright samples have not hit have no difference between A and B.
+//! [`Captures`] estimates their error from the pixels that such samples have hit.
+//!
 //! The error of a sparse picture (stars, hairlines) is concentrated in few pixels. With k effective
 //! pixels (see [`Noise::effective_pixels`]) the relative uncertainty of the estimated RMSE is 1 /
 //! sqrt(2 k). The true error of the picture varies by the same ratio between random seeds.
 
-use crate::film::TILE;
 use crate::film::display::{Display, toned};
 use crate::film::light_weights::LightWeights;
 use crate::film::srgb_table::{SRGB_TABLE, SrgbTable};
 use crate::film::tile::Tile;
+use crate::film::{Captures, Stratum, TILE, TILE_PIXELS};
 use zerkalo_scene::Tone;
 
 /// Pair of numbers, one for each of the two measures of error.
@@ -78,6 +81,8 @@ pub struct TileNoise {
     /// Sum of e^2 over the pixels, where e is the squared error of a pixel, summed over its
     /// channels.
     pub squares: ByMeasure,
+    /// Pixels that rare bright samples have hit, black and white.
+    pub captures: [Captures; 2],
     /// Number of pixels of the tile that are inside the picture.
     pub pixels: u32,
     /// Mean of the numbers of samples per pixel in A and in B.
@@ -126,39 +131,30 @@ impl Estimator {
             return None;
         }
         let [n, m] = counts.map(f64::from);
-        let per_sum = |count: f64| -> Vec<f64> {
+        let per_sum = [n, m].map(|count| -> Vec<f64> {
             self.per_unit.iter().map(|factor| factor * (1.0 / count)).collect()
-        };
-        let (per_sum_a, per_sum_b) = (per_sum(n), per_sum(m));
-        let (share_a, spread) = (n / (n + m), (n * m).sqrt() / (n + m));
+        });
+        let mut means = [[[0.0; 3]; 2]; TILE_PIXELS];
         let [width, height] = tile.extent;
+        let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| [x, y]));
+        for [x, y] in pixels() {
+            let pixel = y * TILE + x;
+            means[pixel] = [0, 1].map(|r| weighted(tile.pixel(r, pixel), &per_sum[r]));
+        }
         let (mut halves, mut squares) = ([ByMeasure::default(); 2], ByMeasure::default());
-        for y in 0..height {
-            for x in 0..width {
-                let pixel = y * TILE + x;
-                let a = weighted(tile.pixel(0, pixel), &per_sum_a);
-                let b = weighted(tile.pixel(1, pixel), &per_sum_b);
-                if a == b {
-                    continue;
-                }
-                let d = [0, 1, 2].map(|c| spread * (a[c] - b[c]));
-                let half = &mut halves[(x + y) % 2];
-                let linear = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                let mean = [0, 1, 2].map(|c| b[c] + share_a * (a[c] - b[c]));
-                let (a, b) = if n == m {
-                    (a, b)
-                } else {
-                    let displaced = |sign: f64| [0, 1, 2].map(|c| (mean[c] + sign * d[c]).max(0.0));
-                    (displaced(1.0), displaced(-1.0))
-                };
-                let (mean, a, b) = (self.levels(mean), self.levels(a), self.levels(b));
-                let mut levels = 0.0;
-                for c in 0..3 {
-                    let (to_a, to_b) = (a[c] - mean[c], b[c] - mean[c]);
-                    levels += 0.5 * (to_a * to_a + to_b * to_b);
-                }
-                half.add(1.0, ByMeasure { linear, levels });
-                squares.add(1.0, ByMeasure { linear: linear * linear, levels: levels * levels });
+        let mut captures = [Captures::default(); 2];
+        for [x, y] in pixels() {
+            let [a, b] = means[y * TILE + x];
+            let (error, contrast) =
+                if a == b { Default::default() } else { self.error_of_pixel([a, b], [n, m]) };
+            halves[(x + y) % 2].add(1.0, error);
+            squares.add(1.0, error.zip(error, |e, _| e * e));
+            if let Some((channel, values)) = self.bright_channel(a, b) {
+                let neighbours = neighbours([x, y], tile.extent).map(|pixel| {
+                    let [a, b] = means[pixel];
+                    a[channel].min(b[channel]) * self.exposure
+                });
+                captures[(x + y) % 2].record(values, contrast, neighbours);
             }
         }
         let pixels = width * height;
@@ -171,15 +167,65 @@ impl Estimator {
             reported: white,
             allocation: black,
             squares,
+            captures,
             pixels: pixels as u32,
             samples: counts[0].midpoint(counts[1]),
         })
+    }
+
+    /// Returns the squared error of a pixel whose means in A and B are `a` and `b`, of `n` and `m`
+    /// samples, summed over channels; also the squared displayed difference between the picture and
+    /// the darker replicate.
+    #[inline(always)]
+    fn error_of_pixel(&self, [a, b]: [[f64; 3]; 2], [n, m]: [f64; 2]) -> (ByMeasure, f64) {
+        let (share_a, spread) = (n / (n + m), (n * m).sqrt() / (n + m));
+        let d = [0, 1, 2].map(|c| spread * (a[c] - b[c]));
+        let linear = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        let mean = [0, 1, 2].map(|c| b[c] + share_a * (a[c] - b[c]));
+        let (a, b) = if n == m {
+            (a, b)
+        } else {
+            let displaced = |sign: f64| [0, 1, 2].map(|c| (mean[c] + sign * d[c]).max(0.0));
+            (displaced(1.0), displaced(-1.0))
+        };
+        let (mean, a, b) = (self.levels(mean), self.levels(a), self.levels(b));
+        let (mut levels, mut contrast) = (0.0, 0.0);
+        for c in 0..3 {
+            let (to_a, to_b) = (a[c] - mean[c], b[c] - mean[c]);
+            levels += 0.5 * (to_a * to_a + to_b * to_b);
+            let to_dark = to_a.min(to_b);
+            contrast += to_dark * to_dark;
+        }
+        (ByMeasure { linear, levels }, contrast)
+    }
+
+    /// Returns the brightest channel of a pixel whose means in A and B are `a` and `b`, with its
+    /// smaller and its larger value in units of white. Returns `None` if the pixel is dark.
+    #[inline(always)]
+    fn bright_channel(&self, a: [f64; 3], b: [f64; 3]) -> Option<(usize, [f64; 2])> {
+        let high = [0, 1, 2].map(|c| a[c].max(b[c]));
+        let blue = usize::from(high[2] > high[1]);
+        let c = if high[0] >= high[1 + blue] { 0 } else { 1 + blue };
+        let values = [a[c].min(b[c]), high[c]].map(|value| value * self.exposure);
+        (values[1] >= Captures::DARKEST).then_some((c, values))
     }
 
     #[inline(always)]
     fn levels(&self, radiance: [f64; 3]) -> [f64; 3] {
         toned(self.tone, radiance.map(|c| c * self.exposure)).map(|c| self.curve.level(c))
     }
+}
+
+/// Iterates over the pixels of a tile beside the pixel in column `x` and row `y`.
+fn neighbours([x, y]: [usize; 2], [width, height]: [usize; 2]) -> impl Iterator<Item = usize> {
+    let pixel = y * TILE + x;
+    let beside = [
+        (x > 0).then(|| pixel - 1),
+        (x + 1 < width).then_some(pixel + 1),
+        (y > 0).then(|| pixel - TILE),
+        (y + 1 < height).then_some(pixel + TILE),
+    ];
+    beside.into_iter().flatten()
 }
 
 #[inline(always)]
@@ -227,11 +273,11 @@ impl Noise {
     pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
         let (mut reported, mut all, mut pixels) = (ByMeasure::default(), ByMeasure::default(), 0.0);
         let mut squares = ByMeasure::default();
+        let tiles: Vec<TileNoise> = tiles.into_iter().collect::<Option<_>>()?;
         let mut tile_errors = Vec::new();
         let mut samples: Option<u32> = None;
         let mut is_uniform = true;
-        for tile in tiles {
-            let tile = tile?;
+        for tile in &tiles {
             is_uniform &= *samples.get_or_insert(tile.samples) == tile.samples;
             let weight = f64::from(tile.pixels);
             reported.add(weight, tile.reported);
@@ -249,6 +295,10 @@ impl Noise {
             let sum = 3.0 * sum;
             if squares > 0.0 { sum * sum / squares } else { 0.0 }
         });
+        for stratum in Stratum::of_tiles(tiles.iter()).values() {
+            reported.levels += stratum.pixels * stratum.missing_of_half(1);
+            all.levels += stratum.pixels * stratum.missing();
+        }
         let rmse = reported.zip(all, |white, all| {
             let sum = if is_uniform { all } else { white.max(all) };
             (sum / pixels).sqrt()

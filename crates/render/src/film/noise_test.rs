@@ -273,6 +273,7 @@ fn noise_combines_the_tiles() {
             reported: mse,
             allocation: mse,
             squares: ByMeasure::SPREAD,
+            captures: Default::default(),
             pixels,
             samples: 4,
         })
@@ -292,6 +293,7 @@ fn noise_combines_the_tiles() {
                 reported: mse(reported),
                 allocation: mse(allocation),
                 squares: ByMeasure::SPREAD,
+                captures: Default::default(),
                 pixels: 256,
                 samples,
             })
@@ -302,4 +304,34 @@ fn noise_combines_the_tiles() {
     assert_eq!((rmse(6.0, 2.0, [8, 8]), rmse(2.0, 6.0, [8, 8])), (2.0, 2.0));
     assert_eq!(Noise::of_tiles([tile(1.0, 256), None]), None);
     assert_eq!(Noise::of_tiles([]), None);
+}
+
+/// Checks the noise estimate of stars: a tenth of the pixels are white, but only 3 % of their
+/// samples receive light, 30 times as bright as white. After 4 samples in each of A and B, most
+/// stars have received none. Without capture-recapture, the true error was 2.6 times the reported
+/// one.
+#[test]
+fn stars_without_light_are_in_the_reported_error() {
+    let (n, mut rng, display) = (4, Rng(7), Display::default());
+    let is_star = |x: usize, y: usize| x % 4 == 1 && y % 3 == 1;
+    for (chance, low, high) in [(0.03, 0.9, 1.15), (0.01, 0.95, 1.4)] {
+        let (mut truth, mut reported) = (0.0, 0.0);
+        for _ in 0..20 {
+            let mut film = film(64, 48, &[2f64.powi(28)]);
+            fill(&mut film, n, |x, y, _| {
+                let hits = (0..n).filter(|_| is_star(x, y) && rng.unit() < chance).count() as f64;
+                vec![hits * 0.9 / chance; 3]
+            });
+            let error = |(i, got): (usize, [f64; 3])| {
+                let value = if is_star(i % 64, i / 64) { 0.9 } else { 0.0 };
+                (display.levels(got)[0] - display.levels([value; 3])[0]).powi(2) / (64.0 * 48.0)
+            };
+            let rows = (0..48).flat_map(|y| film.pixels_of_row(y, &white(1)));
+            truth += rows.enumerate().map(error).sum::<f64>();
+            reported += film.noise(&white(1), &display).unwrap().rmse.levels.powi(2);
+        }
+        let ratio = (truth / reported).sqrt();
+        println!("chance {chance}: true/reported {ratio:.3}");
+        assert!((low..high).contains(&ratio), "chance {chance}: true/reported {ratio}");
+    }
 }

@@ -11,7 +11,7 @@
 //! estimate is too low by chance therefore still gets samples, and one whose estimate is too high
 //! gets only a few too many.
 
-use crate::film::TILE_PIXELS;
+use crate::film::{Stratum, TILE_PIXELS};
 use crate::schedule::tile::{FLATTEST, Tile};
 use crate::schedule::{Criterion, MAX_SAMPLES, SAMPLE_ALIGNMENT, Schedule, to_packet};
 use crate::wave::Job;
@@ -244,12 +244,23 @@ impl Schedule {
         }
         let mut wide: BTreeMap<Class, WeightedSum> = BTreeMap::new();
         wide.extend(classes.keys().map(|class| (*class, widened(*class, &classes))));
+        let missing = self.missing_by_octave();
         let calibrate = |(tile, models): (&Tile, &TileModels)| {
             let mut expected = wide[&class_of(tile, models)];
             expected.add(OWN_WEIGHT * f64::from(tile.pixels), variance(&models.allocation, tile));
-            models.allocation.through(tile.done, expected.mean() / f64::from(tile.done))
+            let missing = missing.get(&tile.done.ilog2()).unwrap_or(&0.0);
+            models.allocation.through(tile.done, expected.mean() / f64::from(tile.done) + missing)
         };
         self.tiles.iter().zip(models).map(calibrate).collect()
+    }
+
+    /// Returns the missing mean squared error that black pixels show ([`Stratum::missing_of_half`]),
+    /// by the binary logarithm of the samples per pixel.
+    fn missing_by_octave(&self) -> BTreeMap<u32, f64> {
+        let strata = Stratum::of_tiles(self.tiles.iter().filter_map(|tile| tile.error.as_ref()));
+        let is_counted = self.settings.criterion == Criterion::Levels;
+        let missing = |(octave, stratum): (u32, Stratum)| (octave, stratum.missing_of_half(0));
+        strata.into_iter().filter(|_| is_counted).map(missing).collect()
     }
 }
 

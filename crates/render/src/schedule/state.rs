@@ -13,7 +13,7 @@
 
 use crate::error_probe::{PairedDifference, ProbeSums};
 use crate::film::file::Fields;
-use crate::film::{ByMeasure, Noise, TileNoise};
+use crate::film::{ByMeasure, Captures, Class, Noise, TileNoise};
 use crate::schedule::tile::Tile;
 use crate::schedule::{Criterion, MAX_SAMPLES, Schedule};
 use crate::wave::Job;
@@ -127,13 +127,24 @@ fn decode_tile(tile: &mut Tile, fields: &mut Fields) -> Option<()> {
 fn encode_estimate(noise: &TileNoise, out: &mut Vec<u8>) {
     out.extend(noise.samples.to_le_bytes());
     [noise.reported, noise.allocation, noise.squares].into_iter().for_each(|m| by_measure(m, out));
+    for class in noise.captures.iter().flat_map(|captures| captures.0) {
+        let Class { once, twice, excess, contrast } = class;
+        [once, twice, excess, contrast].iter().for_each(|n| out.extend(n.to_le_bytes()));
+    }
 }
 
 fn decode_estimate(pixels: u32, fields: &mut Fields) -> Option<TileNoise> {
     let samples = fields.u32().filter(|samples| *samples > 0)?;
     let [reported, allocation, squares] =
         [decode_by_measure(fields)?, decode_by_measure(fields)?, decode_by_measure(fields)?];
-    Some(TileNoise { reported, allocation, squares, pixels, samples })
+    let mut captures = [Captures::default(); 2];
+    for class in captures.iter_mut().flat_map(|captures| &mut captures.0) {
+        let mut number =
+            || fields.u32().map(f32::from_bits).filter(|number| number.is_nan() || *number >= 0.0);
+        let [once, twice] = [number()?, number()?];
+        *class = Class { once, twice, excess: number()?, contrast: number()? };
+    }
+    Some(TileNoise { reported, allocation, squares, captures, pixels, samples })
 }
 
 fn encode_probe(sums: &ProbeSums, out: &mut Vec<u8>) {

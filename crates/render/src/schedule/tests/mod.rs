@@ -100,7 +100,14 @@ impl Model {
             (allocation, reported) = (mse(0.0), mse(2.0 * reported.levels));
         }
         let samples = self.counts[0][tile];
-        TileNoise { reported, allocation, squares: SPREAD_OUT, pixels: PIXELS, samples }
+        TileNoise {
+            reported,
+            allocation,
+            squares: SPREAD_OUT,
+            captures: Default::default(),
+            pixels: PIXELS,
+            samples,
+        }
     }
 
     /// Returns the true mean squared error of the mean of both replicates in a tile.
