@@ -4,7 +4,7 @@
 use crate::measure::experiment::Variant;
 use crate::measure::reference_image::{Errors, Reference};
 use std::io;
-use zerkalo_render::SyncRender;
+use zerkalo_render::{ErrorParts, SyncRender};
 
 /// Point of an error curve.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +21,8 @@ pub struct Point {
     /// first estimate.
     pub estimated_levels: Option<f64>,
     pub errors: Errors,
+    /// Parts of the estimated error. `None` before the first estimate.
+    pub parts: Option<ErrorParts>,
 }
 
 /// Ratio to which the estimated error falls from one point to the next: about 2^(-1/4), so that a
@@ -58,6 +60,7 @@ pub fn follow(
                     seconds: vec![render.seconds],
                     estimated_levels: estimate,
                     errors,
+                    parts: render.error_parts(),
                 });
             }
             let is_unbiased = variant.experiment.is_unbiased;

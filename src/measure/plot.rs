@@ -10,6 +10,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontStyle, register_font};
 use std::error::Error;
 use std::ops::Range;
+use zerkalo_render::ErrorParts;
 
 /// Font of plots, which are therefore the same on every machine. It is Ubuntu Light, reduced to
 /// Latin, Greek and Cyrillic letters, figures and signs, without hinting.
@@ -36,11 +37,16 @@ const INK: RGBColor = RGBColor(40, 40, 40);
 const GRID: RGBColor = RGBColor(226, 226, 226);
 const TARGET: RGBColor = RGBColor(150, 150, 150);
 
+/// Smallest part of an error that a plot shows, in 8-bit levels.
+const SMALLEST_PART: f64 = 1e-3;
+
+/// Name and points of a curve.
+type Curve<'a> = (&'a str, Vec<(f64, f64)>);
 type Drawn = Result<(), Box<dyn Error>>;
 
 /// Draws the plot of error against time as SVG.
 pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Error>> {
-    let (cols, rows) = grid(panels(measurement).len());
+    let (cols, rows) = grid(panels(measurement).len() + 1);
     let size = ((cols * PANEL.0) as u32, (HEAD + rows * PANEL.1) as u32);
     let mut text = String::new();
     draw(SVGBackend::with_string(&mut text, size), measurement, title)?;
@@ -112,29 +118,50 @@ fn draw(backend: SVGBackend, measurement: &Measurement, title: &str) -> Drawn {
     let words = "Error against time: lower and further left is better";
     head.draw_text(words, &text(14, DEFAULT), (24, 40))?;
     let panels = panels(measurement);
-    let (cols, rows) = grid(panels.len());
-    let areas = body.split_evenly((rows as usize, cols as usize));
-    for (area, (experiment, variants)) in areas.iter().zip(&panels) {
-        panel(area, measurement, experiment, variants)?;
+    let (cols, rows) = grid(panels.len() + 1);
+    let mut areas = body.split_evenly((rows as usize, cols as usize)).into_iter();
+    for ((experiment, variants), area) in panels.iter().zip(&mut areas) {
+        let all = std::iter::once(measurement.default()).chain(*variants);
+        let curves = all.map(|measured| (measured.variant.name.as_str(), points(measured)));
+        panel(&area, &measurement.targets, experiment.title, curves.collect())?;
+    }
+    if let Some(area) = areas.next() {
+        panel(&area, &[], "Parts of the error, default settings", parts(measurement.default()))?;
     }
     root.present()?;
     Ok(())
 }
 
-/// Draws the panel of one experiment: the curves of the default settings and of `variants`.
+/// Returns the curves of the whole error and of its parts: points (seconds, 8-bit levels).
+fn parts(measured: &Measured) -> Vec<Curve<'static>> {
+    let curve = |name, part: fn(&ErrorParts) -> Option<f64>| {
+        let all = measured.points.iter();
+        let point = |p: &crate::measure::Point| {
+            Some((median(&p.seconds), p.parts.as_ref().and_then(part)?))
+        };
+        let shown = |(seconds, levels): &(f64, f64)| *seconds > 0.0 && *levels >= SMALLEST_PART;
+        (name, all.filter_map(point).filter(shown).collect())
+    };
+    vec![
+        curve("error", |parts| Some(parts.total()).filter(|total| total.is_finite())),
+        curve("noise", |parts| Some(parts.noise)),
+        curve("rounding", |parts| parts.rounding),
+        curve("cut paths, bound", |parts| parts.cut_paths.filter(|cut| cut.is_finite())),
+        curve("8 bits", |parts| Some(parts.quantization)),
+    ]
+}
+
+/// Draws a panel of `curves`, with lines at `targets` that are visible.
 fn panel(
     area: &DrawingArea<SVGBackend, Shift>,
-    measurement: &Measurement,
-    experiment: &Experiment,
-    variants: &[Measured],
+    targets: &[f64],
+    title: &str,
+    curves: Vec<Curve>,
 ) -> Drawn {
-    let all = std::iter::once(measurement.default()).chain(variants);
-    let curves: Vec<(&str, Vec<(f64, f64)>)> =
-        all.map(|measured| (measured.variant.name.as_str(), points(measured))).collect();
     let numbers = || curves.iter().flat_map(|(_, points)| points);
     let (seconds, levels) = (range(numbers().map(|p| p.0)), range(numbers().map(|p| p.1)));
     let mut chart = ChartBuilder::on(area)
-        .caption(experiment.title, text(15, INK))
+        .caption(title, text(15, INK))
         .margin(12)
         .x_label_area_size(42)
         .y_label_area_size(52)
@@ -153,7 +180,7 @@ fn panel(
         .x_label_formatter(&label)
         .y_label_formatter(&label)
         .draw()?;
-    for target in measurement.targets.iter().filter(|target| levels.contains(target)) {
+    for target in targets.iter().filter(|target| levels.contains(target)) {
         let line = [(seconds.start, *target), (seconds.end, *target)];
         chart.draw_series(DashedLineSeries::new(line, 4, 4, TARGET.into()))?;
         let unit = if *target == 1.0 { "level" } else { "levels" };

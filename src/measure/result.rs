@@ -209,6 +209,7 @@ mod tests {
             seconds: vec![*spp * 1e-3, *spp * 3e-3, *spp * 2e-3],
             estimated_levels: Some(2.0 * levels),
             errors: Errors { rmse_linear: levels / 255.0, rmse_levels: *levels, spread: 0.0 },
+            parts: None,
         };
         let points = points.iter().enumerate().map(point).collect();
         Measured {

@@ -208,6 +208,7 @@ mod tests {
             seconds: vec![*seconds; 3],
             estimated_levels: Some(*levels),
             errors: Errors { rmse_linear: 0.0, rmse_levels: *levels, spread: 0.0 },
+            parts: None,
         };
         let points = points.iter().map(point).collect();
         Measured {

@@ -109,7 +109,8 @@ fn render_writes_a_picture() {
     for part in ["a.png", "64x48", "8 spp", "noise ", " s\n"] {
         assert!(run.out.contains(part), "no {part:?} in {:?}", run.out);
     }
-    assert_eq!(run.out.lines().count(), 1, "{:?}", run.out);
+    let lines: Vec<_> = run.out.lines().collect();
+    assert!(lines.len() == 2 && lines[1].starts_with("error "), "{:?}", run.out);
     assert_eq!(desk.files(), ["a.png", "scene.toml"]);
     let run = desk.render("b.EXR", &["--spp", "2"]);
     assert_eq!(run.status, 0, "{}", run.err);
@@ -149,6 +150,7 @@ fn files_hold_provenance_metadata() {
         ("Seed", "42"),
         ("Samples per pixel", "8.00 (8-8)"),
         ("Noise", ""),
+        ("Error", "error "),
         ("Bad samples", "0"),
         ("Saturated samples", "0"),
         ("Saturated pixels", "0"),
@@ -203,7 +205,7 @@ fn stats_file_has_every_key() {
     let desk = Desk::new();
     let stats = desk.stats(&["--spp", "31", "--threads", "2", "--seed", "5", "--uniform"]);
     for key in "scene size seed precision lanes threads samples spp_min spp_mean spp_max seconds \
-         samples_per_second first_picture_seconds noise_levels rmse_linear bad_samples \
+         samples_per_second first_picture_seconds noise_levels error_levels rounding_levels cut_paths_levels rmse_linear bad_samples \
          saturated_samples saturated_pixels peak_rss_bytes stopped_by"
         .split(' ')
     {

@@ -29,6 +29,9 @@ const LARGEST_RATIO: f64 = 0.7;
 /// Cost of a ray in double precision, relative to one in single precision.
 const DOUBLE_COST: u64 = 2;
 
+/// Largest radiance of a sample, far beyond white.
+const BRIGHTEST: f64 = 1e30;
+
 /// Differences between the pixels of two pictures with the same random numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PairedDifference {
@@ -172,7 +175,7 @@ impl Packet {
     }
 }
 
-/// Returns the radiance of a sample under `weights`; black for an invalid one.
+/// Returns the radiance of a sample under `weights`; black in invalid channels.
 fn radiance_of<L: SimdFloat>(
     radiance: &Radiance<L>,
     lane: usize,
@@ -183,7 +186,7 @@ fn radiance_of<L: SimdFloat>(
         let value = group.lane(lane);
         (0..3).for_each(|c| sum[c] += weight[c] * value[c].to_f64());
     }
-    if sum.iter().all(|c| c.is_finite() && *c >= 0.0) { sum } else { [0.0; 3] }
+    sum.map(|c| if c >= 0.0 { c.min(BRIGHTEST) } else { 0.0 })
 }
 
 /// Returns the differences of the samples `from` and `to` of a pixel with the radiance `mean` of
@@ -294,5 +297,69 @@ impl RenderState {
             sums.cost += limits.iter().map(|traced| DOUBLE_COST * traced[i].1).sum::<u64>();
         }
         Some(sums)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::schedule::{Settings, Stop};
+    use crate::{Options, SyncRender};
+    use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+    use zerkalo_scene::Scene;
+
+    /// Renders `scene` with 32 samples per pixel. Returns the displayed pixels and the render.
+    fn render(scene: &Scene, precision: Precision) -> (Vec<[f64; 3]>, SyncRender) {
+        let sampling = SampleSettings { seed: 0, kind: SamplerKind::Sobol };
+        let options = Options::new(precision, sampling, Display::default());
+        let stop = Stop { spp: Some(32), ..Stop::default() };
+        let mut render = SyncRender::new(scene, &options, Settings::new(false, stop), 2).unwrap();
+        while render.step().is_none() {}
+        let RenderState { film, weights, .. } = &render.state;
+        let rows = (0..film.header.height).flat_map(|y| film.row(y, Replicates::Both, weights));
+        (rows.map(|radiance| Display::default().levels(radiance)).collect(), render)
+    }
+
+    fn rmse(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+        let square = |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum();
+        (a.iter().zip(b).map(square).sum::<f64>() / (3 * a.len()) as f64).sqrt()
+    }
+
+    fn probe(render: &mut SyncRender) -> ProbeSums {
+        let pool = crate::threads::pool(2).unwrap();
+        render.state.probe_errors(0..64, &pool, &AtomicBool::new(false)).unwrap()
+    }
+
+    /// Checks the error of single precision in a scene whose extent requires double, against the
+    /// difference of whole pictures.
+    #[test]
+    fn probe_measures_rounding() {
+        let text = include_str!("../../../scenes/mirror-room.toml");
+        let far = "\n[[object]]\nshape.sphere = { center = [0.0, -1e6, 0.0], radius = 1e4 }\n";
+        let mut scene = Scene::parse(&format!("{text}{far}"), "test").unwrap();
+        scene.film.size = [96, 72];
+        let (single, mut rendered) = render(&scene, Precision::Single);
+        let (double, _) = render(&scene, Precision::Double);
+        let (measured, true_error) = (probe(&mut rendered).rounding(32.0), rmse(&single, &double));
+        let ratio = measured.unwrap() / true_error;
+        assert!((0.5..2.0).contains(&ratio), "{measured:?}, true {true_error}");
+        assert!(rendered.schedule.excessive_rounding().is_none(), "there is no target");
+    }
+
+    /// Checks the bound of cut paths between two mirrors that face each other. With mirrors that
+    /// reflect all light, there is none.
+    #[test]
+    fn probe_bounds_cut_paths() {
+        let text = include_str!("../../../scenes/facing-mirrors.toml");
+        let mut scene = Scene::parse(text, "facing-mirrors.toml").unwrap();
+        scene.film.size = [64, 48];
+        scene.materials.values_mut().for_each(|m| m.reflection = m.reflection.min(0.9));
+        (scene.trace.max_depth, scene.trace.min_throughput) = (8, 0.0);
+        let (short, mut rendered) = render(&scene, Precision::Auto);
+        let sums = probe(&mut rendered);
+        scene.trace.max_depth = 200;
+        let (long, _) = render(&scene, Precision::Auto);
+        let (bound, true_error) = (sums.cut_paths().unwrap(), rmse(&short, &long));
+        assert!((0.9..2.5).contains(&(bound / true_error)), "{bound}, true {true_error}");
     }
 }

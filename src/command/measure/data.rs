@@ -16,6 +16,9 @@ struct Point {
     rmse_levels: f64,
     rmse_levels_spread: f64,
     rmse_linear: f64,
+    /// Null if it was not measured or has no bound, as `cut_paths_levels`.
+    rounding_levels: Option<f64>,
+    cut_paths_levels: Option<f64>,
 }
 
 /// First columns of a line of CSV, before the fields of [`Point`].
@@ -36,6 +39,12 @@ fn points(measured: &Measured) -> impl Iterator<Item = Point> {
         rmse_levels: p.errors.rmse_levels,
         rmse_levels_spread: p.errors.spread,
         rmse_linear: p.errors.rmse_linear,
+        rounding_levels: p.parts.as_ref().and_then(|parts| parts.rounding),
+        cut_paths_levels: p
+            .parts
+            .as_ref()
+            .and_then(|parts| parts.cut_paths)
+            .filter(|levels| levels.is_finite()),
     })
 }
 

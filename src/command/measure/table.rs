@@ -133,6 +133,9 @@ impl MeasureReport<'_> {
                 percent(spread)
             )?;
         }
+        if let Some(parts) = default.points.last().and_then(|point| point.parts.as_ref()) {
+            writeln!(f, "  at the end: {parts}")?;
+        }
         if !m.expected.is_empty() {
             writeln!(f, "  ~ extrapolated from the convergence so far")?;
         }

@@ -5,14 +5,16 @@ use crate::error_probe::ProbeSums;
 use crate::schedule::{SAMPLE_ALIGNMENT, Schedule};
 use std::ops::Range;
 
-/// Share of the rays of a render that probes may cost.
+/// Reciprocal of the largest share of a render's rays that the first probe may cost.
+const FIRST_SHARE: u64 = 64;
+/// Reciprocal of the largest share of a render's rays that all probes together may cost.
 const SHARE: u64 = 128;
 /// Number of rays per primitive after which the scene is compiled in double precision. Compiling a
 /// primitive takes about as long as four rays.
 const RAYS_PER_PRIMITIVE: u64 = 256;
 /// Largest number of packets of one probe.
 const MAX_PACKETS: u64 = 1024;
-/// Number of packets after which the parts of the error decide about the end of a render.
+/// Smallest number of packets of the first probe.
 const MIN_PACKETS: u32 = 16;
 /// Samples of a packet: those of 16 pixels in both replicates.
 const PACKET_SAMPLES: u64 = 32;
@@ -49,11 +51,12 @@ impl Schedule {
             0 => 7 * PACKET_SAMPLES * self.rays / self.samples.max(1),
             packets => done.cost / u64::from(packets),
         };
-        let affordable = (self.rays / SHARE).saturating_sub(done.cost) / cost_of_packet.max(1);
         let least = u64::from(MIN_PACKETS.saturating_sub(done.packets));
+        let share = if least > 0 { FIRST_SHARE } else { SHARE };
+        let affordable = (self.rays / share).saturating_sub(done.cost) / cost_of_packet.max(1);
         let packets = match self.settings.stop.error {
             Some(_) => affordable.max(least),
-            None if self.rays < RAYS_PER_PRIMITIVE * primitives => 0,
+            None if affordable < least || self.rays < RAYS_PER_PRIMITIVE * primitives => 0,
             None => affordable,
         };
         let packets = packets.min(MAX_PACKETS).min(self.tiles.len() as u64 + least) as u32;
