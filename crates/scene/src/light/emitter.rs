@@ -290,10 +290,13 @@ impl<S: Float> Emitter<S> {
     /// several or if the surface is not flat.
     pub fn normal(&self) -> Option<DVec3> {
         match &self.surface {
-            Surface::Rectangle { axes, .. } | Surface::Disk { axes, .. } if !self.sides.both => {
-                Some(DVec3::from(axes[2].map(S::to_f64)))
+            Surface::Rectangle { axes, .. } | Surface::Disk { axes, .. } => {
+                (!self.sides.both).then(|| DVec3::from(axes[2].map(S::to_f64)))
             }
-            _ => None,
+            Surface::Sphere { .. }
+            | Surface::DistantDisk { .. }
+            | Surface::Faces { .. }
+            | Surface::Mesh(_) => None,
         }
     }
 

@@ -113,6 +113,8 @@ pub(crate) struct EmitterChoice<S> {
     pub ways: usize,
     /// `true` if rays see all emitters.
     pub all_visible: bool,
+    /// `true` if samples are multiplied by the emission of some emitters.
+    pub colored: bool,
     slots: usize,
     /// Cluster of each slot of each cell.
     cluster_of: Vec<u16>,
@@ -177,6 +179,7 @@ impl<S: Float> EmitterChoice<S> {
             sums: sums.collect(),
             ways: MAX_WAYS.min(1 << count.ilog2()),
             all_visible: true,
+            colored: false,
             slots: (clusters_per_cell * SLOTS_PER_CLUSTER).next_power_of_two(),
             cluster_of: Vec::new(),
             clusters: Vec::new(),
@@ -287,7 +290,7 @@ impl<S: Float> EmitterChoice<S> {
                 emitters[lane] = place;
                 (found[0][lane], found[1][lane]) = (S::from_f64(share), S::from_f64(rest));
             }
-            expected = expected * L::from_fn(|lane| found[0][lane]);
+            expected *= L::from_fn(|lane| found[0][lane]);
             rest = L::from_fn(|lane| found[1][lane]);
         }
         let places = emitters;

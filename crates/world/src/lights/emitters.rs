@@ -177,8 +177,10 @@ impl<S: Float> Emitters<S> {
                 bounds.power = (bounds.power / largest).clamp(1e-9, 1.0);
             }
             let mut choice = EmitterChoice::new(list, (low, high));
-            let is_visible = |number: &u32| self.sources[*number as usize].visible;
-            choice.all_visible = choice.emitters().iter().all(is_visible);
+            let sources = || choice.emitters().iter().map(|number| &self.sources[*number as usize]);
+            let all_visible = sources().all(|source| source.visible);
+            let colored = sources().any(|source| source.emission.is_some());
+            (choice.all_visible, choice.colored) = (all_visible, colored);
             for (emitter, place) in choice.emitters().iter().zip(0..) {
                 self.place_of[*emitter as usize] = (self.choices.len() as u32, place);
             }
@@ -217,8 +219,7 @@ impl<S: Float> Emitters<S> {
                 |i| S::from_f64(choice.expected(cells.all[i], chosen.places[i] as usize));
             light.density = (light.density * L::from_fn(expected)).min(L::from_f64(L::MAX));
         }
-        let first = &self.sources[choice.emitters()[0] as usize];
-        if first.emission.is_some() {
+        if choice.colored {
             let one = [S::from_f64(1.0); 3];
             let emission = Vec3::from_fn(|i| source(i).emission.unwrap_or(one));
             light.irradiance = light.irradiance.component_mul(emission);
@@ -227,7 +228,8 @@ impl<S: Float> Emitters<S> {
             let visible = |i: usize| S::from_f64(f64::from(source(i).visible));
             light.density = light.density.masked(L::from_fn(visible).gt(L::zero()));
         }
-        let source = LightSource { light, group: first.group, emission: None, visible: true };
+        let LightSource { group, .. } = self.sources[choice.emitters()[0] as usize];
+        let source = LightSource { light, group, emission: None, visible: true };
         (source, chosen.emitters)
     }
 
