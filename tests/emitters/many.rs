@@ -1,5 +1,5 @@
-//! Scenes with many point lights, of which each path samples only a few. The mean radiance is
-//! compared with the sum over all lights.
+//! Scenes with many lights, of which each path samples only a few. The mean radiance is compared with
+//! the sum over all lights.
 
 use crate::harness::*;
 
@@ -218,5 +218,67 @@ fn a_thousand_lights_at_extreme_places_have_finite_samples() {
         [radiance::<Single>(&scene, 1 << 12, 1), radiance::<Double>(&scene, 1 << 12, 2)]
     {
         assert!(mean > 0.0 && error.is_finite(), "{mean} ± {error}");
+    }
+}
+
+/// Smallest number of emitters of which each path samples only a few.
+const CHOSEN_EMITTERS: usize = 16;
+
+/// Returns lamps above the plane y = 0: lights and emissive objects of every kind, some of them
+/// invisible, one much brighter than the others.
+fn lamps(count: usize, numbers: &mut Numbers) -> Vec<String> {
+    let lamp = |i: usize| {
+        let center = numbers.in_cube(1.5) + 1.8 * DVec3::Y;
+        let (normal, position) = (array(numbers.in_cube(1.0) - center), array(center));
+        let intensity = if i == 3 { 30.0 } else { 0.2 * (1 + i % 4) as f64 };
+        let shape = match i % 4 {
+            0 => format!(
+                "rectangle = {{ center = {position}, size = [0.3, 0.2], normal = {normal} }}"
+            ),
+            1 => format!("disk = {{ center = {position}, radius = 0.15, normal = {normal} }}"),
+            2 => format!("sphere = {{ center = {position}, radius = 0.1 }}"),
+            _ => {
+                let corner = array(center - DVec3::splat(0.05));
+                return match i % 8 {
+                    3 => format!(
+                        "[[object]]\nmaterial = \"lamp\"\nshape.cube = {{ corner = {corner}, edge = 0.1 }}\n"
+                    ),
+                    _ => format!(
+                        "[[object]]\nmaterial = \"lamp\"\nshape.sphere = {{ center = {position}, radius = 0.1 }}\n"
+                    ),
+                };
+            }
+        };
+        let visible = i % 5 != 0;
+        format!("[[light]]\n{shape}\nintensity = {intensity:?}\nvisible = {visible}\n")
+    };
+    (0..count).map(lamp).collect()
+}
+
+/// Checks a diffuse and a glossy receiver, which the lamps light all together, and few at a time.
+#[test]
+fn light_of_chosen_emitters_is_the_sum_over_all_emitters() {
+    let glossy = "diffuse = 0.3\nreflection = 0.8\nlobe = \"ggx\"\nalpha = 0.3\n";
+    let limit = two_sided_z(1e-3 / 8.0);
+    for (seed, (count, material)) in
+        (1..).zip([(18, WHITE), (40, glossy), (200, WHITE), (200, glossy)])
+    {
+        let lamps = lamps(count, &mut Numbers::new(61));
+        let of = |lamps: &[String]| {
+            let scene = parsed(&receiver_text(DVec3::Y, material, &lamps.concat()));
+            [radiance::<Single>(&scene, 1 << 13, seed), radiance::<Double>(&scene, 1 << 13, seed)]
+        };
+        let chosen = of(&lamps);
+        let few: Vec<_> = lamps.chunks(CHOSEN_EMITTERS - 1).map(of).collect();
+        for (i, (mean, error)) in chosen.into_iter().enumerate() {
+            let sum: f64 = few.iter().map(|few| few[i].0).sum();
+            let variance: f64 = few.iter().map(|few| few[i].1.powi(2)).sum();
+            let off = (mean - sum).abs() - 1e-4 * sum;
+            let error = error.hypot(variance.sqrt());
+            assert!(
+                off <= limit * error,
+                "{count}: {mean} ± {error}, expected {sum}, in\n{material}"
+            );
+        }
     }
 }

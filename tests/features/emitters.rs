@@ -3,7 +3,7 @@
 use crate::features::row::*;
 use crate::harness::*;
 use crate::reference::*;
-use zerkalo_scene::light::{Environment, LightUnit};
+use zerkalo_scene::light::{Environment, LightUnit, SphereLight};
 
 /// Checks that the picture of `file` agrees with the reference tracer. The picture of each of
 /// `mutations`, changed versions of the scene, must disagree.
@@ -170,4 +170,12 @@ fn d11_many_lights() {
             ("a darker mirror", &|s| material(s, "mirror").reflection = 0.6),
         ],
     );
+    let mut bulbs = shipped("many-lights.toml");
+    for light in &mut bulbs.lights[..20] {
+        let center = *light.position_mut().unwrap();
+        light.kind = LightKind::Sphere(SphereLight { center, radius: 0.1 });
+        (light.falloff, light.intensity) = (Falloff::None, light.intensity * 30.0);
+    }
+    assert!(bulbs.faults().is_empty(), "{}", bulbs.faults()[0]);
+    agrees(&bulbs, &bulbs, REFERENCE_SAMPLES).unwrap();
 }

@@ -292,7 +292,7 @@ impl<S: Float> CompiledLights<S> {
         LightBounds {
             delta_lights: self.delta_lights.iter().map(target_of).collect(),
             max_end_offset: on_surfaces.map(OnSurface::farthest).fold(0.0, f64::max),
-            emitters: self.emitters.balls().map(LightTarget::Ball).collect(),
+            emitters: self.emitters.balls().into_iter().map(LightTarget::Ball).collect(),
             strata: self
                 .choice
                 .iter()

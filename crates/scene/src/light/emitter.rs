@@ -24,8 +24,8 @@ const DISTANT: f64 = 0.5;
 /// direction.
 #[derive(Clone, Debug)]
 pub struct Emitter<S> {
-    surface: Surface<S>,
-    sides: Sides<S>,
+    pub(super) surface: Surface<S>,
+    pub(super) sides: Sides<S>,
     pub radiance: S,
     /// Centre of a bounding sphere of all sampled points, relative to the scene's centre.
     pub center: DVec3,
@@ -35,7 +35,7 @@ pub struct Emitter<S> {
 }
 
 #[derive(Clone, Debug)]
-enum Surface<S> {
+pub(super) enum Surface<S> {
     Sphere {
         center: [S; 3],
         radius: S,
@@ -87,9 +87,13 @@ impl<S: Float> Sides<S> {
         [x, y, height]: [L; 3],
         backs: L::Mask,
     ) -> ([L; 3], L::Mask) {
-        let behind = backs & height.gt(L::zero());
-        let height = L::select(behind, -height, height) + L::splat(self.lift);
-        ([x, y, height], behind)
+        lifted([x, y, height], (L::splat(self.lift), backs))
+    }
+
+    /// Returns the lift, and the lanes whose back emits light: the same in all lanes.
+    #[inline(always)]
+    fn lanes<L: SimdFloat<Scalar = S>>(&self) -> LaneSides<L> {
+        (L::splat(self.lift), L::mask(self.both))
     }
 
     /// Returns the density [1/sr] of directions that are sampled uniformly in the cone that a
@@ -101,6 +105,17 @@ impl<S: Float> Sides<S> {
     }
 }
 
+/// Lift of each lane's surface, and the lanes whose backs emit light; see [`Sides`].
+pub(super) type LaneSides<L> = (L, <L as SimdFloat>::Mask);
+
+/// Result of [`Sides::lifted`] for the surface of each lane.
+#[inline(always)]
+fn lifted<L: SimdFloat>([x, y, height]: [L; 3], (lift, backs): LaneSides<L>) -> ([L; 3], L::Mask) {
+    let behind = backs & height.gt(L::zero());
+    let height = L::select(behind, -height, height) + lift;
+    ([x, y, height], behind)
+}
+
 /// Sampled point of an emitter, as seen from the receiver.
 pub(super) struct PointSample<L: SimdFloat> {
     pub wi: Vec3<L>,
@@ -109,6 +124,85 @@ pub(super) struct PointSample<L: SimdFloat> {
     pub density: L,
     /// Density [1/sr] by which the radiance is divided; zero if no light arrives.
     pub pdf: L,
+}
+
+impl<L: SimdFloat> PointSample<L> {
+    /// Returns samples without light.
+    #[inline(always)]
+    pub fn nothing() -> Self {
+        let wi = Vec3::of([0.0, 0.0, 1.0]);
+        Self { wi, distance: L::one(), density: L::zero(), pdf: L::zero() }
+    }
+
+    /// Returns the light of the sampled points, whose radiance is `radiance`.
+    #[inline(always)]
+    pub fn with_radiance(self, radiance: L) -> LightSample<L> {
+        let Self { wi, distance, density, pdf } = self;
+        let arrives = pdf.gt(L::zero());
+        // The irradiance is kept finite, because infinity times a black reflectance would be NaN.
+        let irradiance = (radiance / pdf).min(L::from_f64(L::MAX));
+        LightSample { wi, distance, irradiance: Vec3::gray(irradiance.masked(arrives)), density }
+    }
+}
+
+/// Samples a point of each lane's sphere by the cone that the sphere subtends.
+#[inline(always)]
+pub(super) fn sample_sphere<L: SimdFloat>(
+    to_center: Vec3<L>,
+    radius: L,
+    (lift, both): LaneSides<L>,
+    (u, v): (L, L),
+) -> PointSample<L> {
+    let cone = Cone::new(to_center, radius);
+    let local = warp::cone(u, v, cone.one_minus_cos);
+    let wi = Frame::around(cone.axis).to_world(local).renormalize();
+    // Distance to the lifted point in the sampled direction. The lifted point is on a concentric
+    // sphere, which is larger by the lift if the receiver is outside, and smaller by the lift if
+    // the receiver is inside.
+    let sin2 = local.x * local.x + local.y * local.y;
+    let outer = radius + lift;
+    let root2 = outer * outer - cone.distance2 * sin2;
+    let near = cone.distance2.sqrt() * local.z - root2.max(L::zero()).sqrt();
+    let (along, inner) = (to_center.dot(wi), radius - lift);
+    let root2 = along * along + inner * inner - cone.distance2;
+    let far = along + root2.max(L::zero()).sqrt();
+    let distance = L::select(cone.inside, far, near).max(L::zero());
+    let density = cone.density().masked(both | !cone.inside);
+    PointSample { wi, distance, density, pdf: density }
+}
+
+/// Samples a point of each lane's rectangle by solid angle.
+#[inline(always)]
+pub(super) fn sample_rectangle<L: SimdFloat>(
+    to_center: Vec3<L>,
+    axes: [Vec3<L>; 3],
+    size: [L; 2],
+    sides: LaneSides<L>,
+    (u, v): (L, L),
+) -> PointSample<L> {
+    let ([x, y, height], behind) = lifted(local_of(&axes, to_center), sides);
+    let rectangle = SphericalRectangle::new(size, [x, y, height]);
+    let [x, y] = rectangle.sample(u, v);
+    let height = L::select(behind, -height, height);
+    let (wi, distance) = towards(&axes, [x, y, height]);
+    let density = rectangle.density(distance);
+    PointSample { wi, distance, density, pdf: density }
+}
+
+/// Samples a point of each lane's disk by area.
+#[inline(always)]
+pub(super) fn sample_disk<L: SimdFloat>(
+    to_center: Vec3<L>,
+    axes: [Vec3<L>; 3],
+    (radius, area): (L, L),
+    (u, v): (L, L),
+) -> PointSample<L> {
+    let local = local_of(&axes, to_center);
+    let (x, y, _) = warp::disk(u, v);
+    let (x, y) = (x.mul_add(radius, local[0]), y.mul_add(radius, local[1]));
+    let (wi, distance) = towards(&axes, [x, y, local[2]]);
+    let density = density_of_area(area, distance, local[2]);
+    PointSample { wi, distance, density, pdf: density }
 }
 
 impl<S: Float> Emitter<S> {
@@ -192,6 +286,20 @@ impl<S: Float> Emitter<S> {
         }
     }
 
+    /// Returns the normal of the only side of a flat surface that emits light; `None` if there are
+    /// several or if the surface is not flat.
+    pub fn normal(&self) -> Option<DVec3> {
+        match &self.surface {
+            Surface::Rectangle { axes, .. } | Surface::Disk { axes, .. } => {
+                (!self.sides.both).then(|| DVec3::from(axes[2].map(S::to_f64)))
+            }
+            Surface::Sphere { .. }
+            | Surface::DistantDisk { .. }
+            | Surface::Faces { .. }
+            | Surface::Mesh(_) => None,
+        }
+    }
+
     pub fn is_distant(&self) -> bool {
         matches!(self.surface, Surface::DistantDisk { .. })
     }
@@ -256,27 +364,17 @@ impl<S: Float> Emitter<S> {
     ) -> LightSample<L> {
         let point = match &self.surface {
             Surface::Sphere { center, radius } => {
-                self.sample_sphere(Vec3::splat(*center) - origin, L::splat(*radius), (u, v))
+                let to_center = Vec3::splat(*center) - origin;
+                sample_sphere(to_center, L::splat(*radius), self.sides.lanes(), (u, v))
             }
             Surface::Rectangle { center, axes, size } => {
-                let to_center = Vec3::splat(*center) - origin;
-                let ([x, y, height], behind) =
-                    self.sides.lifted(local_of(axes, to_center), L::mask(self.sides.both));
-                let rectangle = SphericalRectangle::new(size.map(L::splat), [x, y, height]);
-                let [x, y] = rectangle.sample(u, v);
-                let height = L::select(behind, -height, height);
-                let (wi, distance) = towards(axes, [x, y, height]);
-                let density = rectangle.density(distance);
-                PointSample { wi, distance, density, pdf: density }
+                let (to_center, axes) = (Vec3::splat(*center) - origin, axes.map(Vec3::splat));
+                sample_rectangle(to_center, axes, size.map(L::splat), self.sides.lanes(), (u, v))
             }
             Surface::Disk { center, axes, radius } => {
-                let local = local_of(axes, Vec3::splat(*center) - origin);
-                let (x, y, _) = warp::disk(u, v);
-                let radius = L::splat(*radius);
-                let (x, y) = (x.mul_add(radius, local[0]), y.mul_add(radius, local[1]));
-                let (wi, distance) = towards(axes, [x, y, local[2]]);
-                let density = density_of_area(L::from_f64(self.area), distance, local[2]);
-                PointSample { wi, distance, density, pdf: density }
+                let (to_center, axes) = (Vec3::splat(*center) - origin, axes.map(Vec3::splat));
+                let (radius, area) = (L::splat(*radius), L::from_f64(self.area));
+                sample_disk(to_center, axes, (radius, area), (u, v))
             }
             Surface::DistantDisk { axis, one_minus_cos } => {
                 let local = warp::cone(u, v, L::splat(*one_minus_cos));
@@ -292,38 +390,7 @@ impl<S: Float> Emitter<S> {
                 Triangle::sample_by_area(triangles, &self.sides, origin, (u, v))
             }
         };
-        let PointSample { wi, distance, density, pdf } = point;
-        let arrives = pdf.gt(L::zero());
-        // The irradiance is kept finite, because infinity times a black reflectance would be NaN.
-        let irradiance = (L::splat(self.radiance) / pdf).min(L::from_f64(L::MAX));
-        LightSample { wi, distance, irradiance: Vec3::gray(irradiance.masked(arrives)), density }
-    }
-
-    /// Samples a point of a sphere by the cone that the sphere subtends.
-    #[inline(always)]
-    fn sample_sphere<L: SimdFloat<Scalar = S>>(
-        &self,
-        to_center: Vec3<L>,
-        radius: L,
-        (u, v): (L, L),
-    ) -> PointSample<L> {
-        let lift = L::splat(self.sides.lift);
-        let cone = Cone::new(to_center, radius);
-        let local = warp::cone(u, v, cone.one_minus_cos);
-        let wi = Frame::around(cone.axis).to_world(local).renormalize();
-        // Distance to the lifted point in the sampled direction. The lifted point is on a concentric
-        // sphere, which is larger by the lift if the receiver is outside, and smaller by the lift if
-        // the receiver is inside.
-        let sin2 = local.x * local.x + local.y * local.y;
-        let outer = radius + lift;
-        let root2 = outer * outer - cone.distance2 * sin2;
-        let near = cone.distance2.sqrt() * local.z - root2.max(L::zero()).sqrt();
-        let (along, inner) = (to_center.dot(wi), radius - lift);
-        let root2 = along * along + inner * inner - cone.distance2;
-        let far = along + root2.max(L::zero()).sqrt();
-        let distance = L::select(cone.inside, far, near).max(L::zero());
-        let density = self.sides.cone_density(&cone);
-        PointSample { wi, distance, density, pdf: density }
+        point.with_radiance(L::splat(self.radiance))
     }
 
     /// Returns the density [1/sr] with which [`Emitter::sample`] draws the direction of a ray from
@@ -343,12 +410,14 @@ impl<S: Float> Emitter<S> {
             }
             Surface::Rectangle { center, axes, size } => {
                 let to_center = Vec3::splat(*center) - origin;
+                let axes = axes.map(Vec3::splat);
                 let (local, _) =
-                    self.sides.lifted(local_of(axes, to_center), L::mask(self.sides.both));
+                    self.sides.lifted(local_of(&axes, to_center), L::mask(self.sides.both));
                 SphericalRectangle::new(size.map(L::splat), local).density(distance)
             }
             Surface::Disk { center, axes, .. } => {
-                let [_, _, height] = local_of(axes, Vec3::splat(*center) - origin);
+                let axes = axes.map(Vec3::splat);
+                let [_, _, height] = local_of(&axes, Vec3::splat(*center) - origin);
                 density_of_area(L::from_f64(self.area), distance, height)
             }
             Surface::DistantDisk { one_minus_cos, .. } => density_of_cone(L::splat(*one_minus_cos)),
@@ -399,17 +468,16 @@ fn density_of_cone<L: SimdFloat>(one_minus_cos: L) -> L {
 }
 
 #[inline(always)]
-fn local_of<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> [L; 3] {
-    axes.map(|axis| Vec3::splat(axis).dot(v))
+fn local_of<L: SimdFloat>(axes: &[Vec3<L>; 3], v: Vec3<L>) -> [L; 3] {
+    axes.map(|axis| axis.dot(v))
 }
 
 /// Returns the direction and the length of the vector with the components [x, y, z] along `axes`.
 #[inline(always)]
-fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
+fn towards<L: SimdFloat>([across, up, normal]: &[Vec3<L>; 3], [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
     let distance = (x * x + y * y + z * z).sqrt();
-    let [across, up, normal] = axes.map(Vec3::splat);
     let inverse = L::one() / distance;
-    ((across * x + up * y + normal * z) * inverse, distance)
+    ((*across * x + *up * y + *normal * z) * inverse, distance)
 }
 
 /// Returns where each ray meets the plane of a flat emitter: the distance, negative for rays that
@@ -421,8 +489,9 @@ fn plane_hit<L: SimdFloat>(
     to_center: Vec3<L>,
     direction: Vec3<L>,
 ) -> (L, [L; 2]) {
-    let [center_x, center_y, height] = local_of(axes, to_center);
-    let [x, y, slope] = local_of(axes, direction);
+    let axes = axes.map(Vec3::splat);
+    let [center_x, center_y, height] = local_of(&axes, to_center);
+    let [x, y, slope] = local_of(&axes, direction);
     let meets_front = slope.lt(L::zero()) & height.lt(L::zero());
     let t = L::select(meets_front, height / slope, -L::one());
     (t, [x.mul_add(t, -center_x), y.mul_add(t, -center_y)])

@@ -30,6 +30,7 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
     }
     parts.extend(present([(world.lights.choice.is_some(), "choice of lights")]));
     parts.extend(counted(emissive, "emissive object"));
+    parts.extend(present([(!world.lights.emitters.choices.is_empty(), "choice of emitters")]));
     if unsampled > 0 {
         parts.push(format!("{unsampled} of them without sampled points"));
     }

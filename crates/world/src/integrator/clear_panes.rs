@@ -4,6 +4,7 @@
 use crate::integrator::interaction::interact;
 use crate::integrator::nested_dielectrics::Media;
 use crate::integrator::vertex::Vertex;
+use crate::lights::emitters::Sampled;
 use crate::world::World;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, distinct, next_distinct};
@@ -39,23 +40,25 @@ impl<L: SimdFloat> Vertex<'_, L> {
         }
     }
 
-    /// Returns the result of [`Self::shadow`] for rays of `lit` that end at points of emitter number
-    /// `index`, which another object may hide.
+    /// Returns the result of [`Self::shadow`] for rays of `lit` that end at points of the emitters
+    /// `sampled`, which another object may hide.
     #[inline(always)]
     pub fn emitter_shadow(
         &self,
-        index: usize,
+        sampled: Sampled<'_>,
         (ray, distance): (&Ray<L>, L),
         (lit, occluded): (L::Mask, L::Mask),
         media: Option<Media<'_, L>>,
     ) -> Shadow<L> {
         let World { lights, geometry, .. } = self.world;
         let Shadow { mut occluded, passed } = self.shadow(occluded, ray, distance, media);
-        let lanes = lit.and_not(occluded);
-        occluded = occluded | lights.emitters.covered(index, geometry, ray, distance, lanes);
-        if let Some((media, primitive)) = media.zip(lights.emitters.primitive(index)) {
-            occluded = occluded | media.hidden(primitive);
-        }
+        lights.emitters.for_objects::<L>(sampled, |index, on_emitter| {
+            let lanes = on_emitter & lit.and_not(occluded);
+            occluded = occluded | lights.emitters.covered(index, geometry, ray, distance, lanes);
+            if let Some((media, primitive)) = media.zip(lights.emitters.primitive(index)) {
+                occluded = occluded | (on_emitter & media.hidden(primitive));
+            }
+        });
         Shadow { occluded, passed }
     }
 }

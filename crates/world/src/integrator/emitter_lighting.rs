@@ -16,9 +16,12 @@ use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::{Media, attenuated};
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
+use crate::lights::emitter_choice::{Cells, MAX_WAYS};
+use crate::lights::emitters::Sampled;
 use crate::world::{LightSource, World};
 use zerkalo_kernel::bvh::{Hit, Ray};
-use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, distinct};
+use zerkalo_kernel::lanes::{MAX_WIDTH, Mask, SimdFloat, Vec3, distinct};
+use zerkalo_kernel::primitive::PrimitiveSet;
 use zerkalo_scene::light::LightSample;
 use zerkalo_scene::material::{BsdfQuery, BsdfValue};
 
@@ -43,21 +46,22 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     media: Option<Media<'_, L>>,
     out: &mut Radiance<L>,
 ) {
-    for (light, source) in world.lights.emitters.visible_lights() {
-        let Ray { origin, direction } = path.ray;
+    let Ray { origin, direction } = path.ray;
+    let emitters = &world.lights.emitters;
+    emitters.for_visible_lights(&path.ray, (t_max, lanes), |index, light, source| {
         let t = light.hit(origin, direction);
         let seen = lanes & t.lt(t_max);
         if seen.none() {
-            continue;
+            return;
         }
         let mut radiance = path.throughput * L::splat(light.radiance);
         if path.lobe_pdf.lt(L::from_f64(L::MAX)).any() {
-            let pdf = path.light_density(light, t, L::from_id(0));
+            let pdf = path.light_density(emitters, (index, light), t, L::from_id(0));
             radiance = radiance * power_heuristic(path.lobe_pdf, pdf);
         }
         radiance = attenuated(media, radiance, t);
         out.groups[source.group] += source.emitted(radiance).masked(seen);
-    }
+    });
     let escaped = lanes.and_not(t_max.lt(L::from_f64(L::MAX)));
     if !world.lights.environments.is_empty() && escaped.any() {
         visible_environments(world, path, escaped, media, out);
@@ -104,12 +108,13 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let path = &*self.path;
         let interaction = self.interaction;
         for (primitive, lanes) in distinct(interaction.primitive, interaction.has_bsdf) {
-            let Some(source) = self.world.lights.emitters.of_primitive(primitive) else { continue };
+            let emitters = &self.world.lights.emitters;
+            let Some((index, source)) = emitters.of_primitive(primitive) else { continue };
             let mut radiance = path.throughput;
             if let Some(light) = &source.light
                 && path.lobe_pdf.lt(L::from_f64(L::MAX)).any()
             {
-                let pdf = path.light_density(light, hit.t, hit.triangle);
+                let pdf = path.light_density(emitters, (index, light), hit.t, hit.triangle);
                 radiance = radiance * power_heuristic(path.lobe_pdf, pdf);
             }
             self.out.groups[source.group] += source.emitted(radiance).masked(lanes);
@@ -130,25 +135,74 @@ impl<L: SimdFloat> Vertex<'_, L> {
             self.environment_lighting(&glossy);
         }
         let origin = self.shadow_origin::<false>();
+        if !world.lights.emitters.choices.is_empty() {
+            return self.chosen_emitters(&glossy);
+        }
         for (index, occluders) in self.candidates.occluders.emitters.iter().enumerate() {
             let Some(source) = self.sample_emitter(index, origin) else { break };
-            self.out.counts.glossy = true;
-            let light = &source.light;
-            let arrives = light.irradiance.x.gt(L::zero());
-            let arrives = arrives & self.arrives(light.wi);
             let rays = source.visible.then_some(&glossy);
-            let value = self.reflected(light, arrives, rays, |_| L::one());
-            let lit = value.max_element().gt(L::zero());
-            let shadow = |vertex: &Self, lit| {
-                let ray = Ray { origin, direction: light.wi };
-                let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
-                let end = (&ray, light.distance);
-                vertex.emitter_shadow(index, end, (lit, occluded), vertex.media)
-            };
-            self.add_light(source.group, lit, shadow, |vertex, _| {
-                source.emitted(vertex.unoccluded(value, light))
-            });
+            self.add_emitter(&source, Sampled::One(index), rays, occluders);
         }
+    }
+
+    /// Adds the light of many emitters: each lane chooses a few of them.
+    #[inline(never)]
+    fn chosen_emitters(&mut self, glossy: &ReflectedRays<L>) {
+        let emitters = &self.world.lights.emitters;
+        let (origin, weighted) = (self.shadow_origin::<false>(), glossy.lanes.any());
+        let choices = emitters.choices.iter().zip(&self.candidates.occluders.emitters);
+        for (index, (choice, occluders)) in choices.enumerate() {
+            let cells = choice.cells(self.interaction.ray_origin(), self.interaction.geometric);
+            for way in 0..choice.ways {
+                let (source, chosen) = self.sample_chosen((index, way), &cells, (origin, weighted));
+                let lanes = glossy.lanes & source.light.density.gt(L::zero());
+                let rays = ReflectedRays { lanes, share: glossy.share };
+                self.add_emitter(&source, Sampled::Each(&chosen), Some(&rays), occluders);
+            }
+        }
+    }
+
+    /// Adds the light of the point `source` on the emitters `sampled`. `rays` are the reflected rays
+    /// that may hit the emitters. `occluders` are the primitives that shadow rays are tested
+    /// against.
+    #[inline(always)]
+    fn add_emitter(
+        &mut self,
+        source: &LightSource<LightSample<L>, L::Scalar>,
+        sampled: Sampled<'_>,
+        rays: Option<&ReflectedRays<L>>,
+        occluders: &PrimitiveSet,
+    ) {
+        self.out.counts.glossy = true;
+        let world = self.world;
+        let (origin, light) = (self.shadow_origin::<false>(), &source.light);
+        let arrives = light.irradiance.max_element().gt(L::zero());
+        let arrives = arrives & self.arrives(light.wi);
+        let value = self.reflected(light, arrives, rays, |_| L::one());
+        let lit = value.max_element().gt(L::zero());
+        let shadow = |vertex: &Self, lit| {
+            let ray = Ray { origin, direction: light.wi };
+            let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
+            let end = (&ray, light.distance);
+            vertex.emitter_shadow(sampled, end, (lit, occluded), vertex.media)
+        };
+        self.add_light(source.group, lit, shadow, |vertex, _| {
+            source.emitted(vertex.unoccluded(value, light))
+        });
+    }
+
+    /// Samples a point of an emitter of choice number `index`; see [`Emitters::sample_chosen`].
+    #[inline(always)]
+    pub fn sample_chosen(
+        &self,
+        (index, way): (usize, usize),
+        cells: &Cells,
+        (origin, weighted): (Vec3<L>, bool),
+    ) -> (LightSource<LightSample<L>, L::Scalar>, [u32; MAX_WIDTH]) {
+        let emitters = &self.world.lights.emitters;
+        let numbers = self.sampler.light_2d(self.bounce, (MAX_WAYS * index + way) as u32);
+        let choice = &emitters.choices[index];
+        emitters.sample_chosen(choice, (cells, way), origin, (numbers, weighted))
     }
 
     /// Returns the lanes of `lanes` whose BSDF scatters light: no mirrors and no smooth glass.

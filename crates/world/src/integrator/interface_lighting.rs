@@ -11,6 +11,7 @@
 use crate::integrator::emitter_lighting::power_heuristic;
 use crate::integrator::nested_dielectrics::{InterfaceHit, Media, NestedDielectrics, attenuated};
 use crate::integrator::vertex::Vertex;
+use crate::lights::emitters::Sampled;
 use crate::world::LightSource;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
@@ -113,9 +114,24 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 continue;
             }
             self.out.counts.glossy = true;
-            for index in 0.. {
-                let Some(source) = self.sample_emitter(index, side.origin) else { break };
-                self.add_scattered(rough, side, &source, Some(index));
+            let emitters = &self.world.lights.emitters;
+            for index in 0..self.candidates.occluders.emitters.len() {
+                match emitters.choices.get(index) {
+                    Some(choice) => {
+                        let normal = interaction.geometric;
+                        let normal = if side.behind { -normal } else { normal };
+                        let cells = choice.cells(side.origin, normal);
+                        for way in 0..choice.ways {
+                            let (source, chosen) =
+                                self.sample_chosen((index, way), &cells, (side.origin, true));
+                            self.add_scattered(rough, side, &source, Some(Sampled::Each(&chosen)));
+                        }
+                    }
+                    None => {
+                        let Some(source) = self.sample_emitter(index, side.origin) else { break };
+                        self.add_scattered(rough, side, &source, Some(Sampled::One(index)));
+                    }
+                }
             }
             for index in 0..self.world.lights.environments.len() {
                 let source = self.sample_environment(index, side.lanes);
@@ -124,15 +140,15 @@ impl<L: SimdFloat> Vertex<'_, L> {
         }
     }
 
-    /// Adds the light of `source` that rough interfaces scatter from one `side`. `emitter` is the
-    /// number of the emitter on which `source` was sampled; `None` for environments.
+    /// Adds the light of `source` that rough interfaces scatter from one `side`. `emitters` are those
+    /// on which `source` was sampled; `None` for environments.
     #[inline(always)]
     fn add_scattered(
         &mut self,
         rough: &RoughInterface<'_, L>,
         side: &Side<'_, L>,
         source: &LightSource<LightSample<L>, L::Scalar>,
-        emitter: Option<usize>,
+        emitters: Option<Sampled<'_>>,
     ) {
         if !source.visible {
             return;
@@ -152,8 +168,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let (ray, t_max) = (Ray { origin: side.origin, direction: light.wi }, light.distance);
             let occluded = world.geometry.occluded(&ray, t_max, lit, world.geometry.all());
             let media = Some(side.media);
-            match emitter {
-                Some(i) => vertex.emitter_shadow(i, (&ray, t_max), (lit, occluded), media),
+            match emitters {
+                Some(on) => vertex.emitter_shadow(on, (&ray, t_max), (lit, occluded), media),
                 None => vertex.shadow(occluded, &ray, t_max, media),
             }
         };

@@ -1,5 +1,6 @@
 //! State of a packet of paths, and the result of tracing it.
 
+use crate::lights::emitters::Emitters;
 use crate::lights::groups::MAX_GROUPS;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
@@ -85,11 +86,22 @@ impl<L: SimdFloat> Path<L> {
 
     /// Returns the density [1/sr] with which a point of `light` is sampled that the ray hits at
     /// distance `t`, on `triangle` of a mesh. Points are sampled from the origin of the ray before
-    /// all clear panes.
+    /// all clear panes. `index` is the number of the light in `emitters`.
     #[inline(always)]
-    pub(crate) fn light_density(&self, light: &Emitter<L::Scalar>, t: L, triangle: L) -> L {
+    pub(crate) fn light_density(
+        &self,
+        emitters: &Emitters<L::Scalar>,
+        (index, light): (usize, &Emitter<L::Scalar>),
+        t: L,
+        triangle: L,
+    ) -> L {
         let Ray { origin, direction } = self.ray;
-        light.density(direction.mul_add(-self.passed, origin), t + self.passed, triangle)
+        let origin = direction.mul_add(-self.passed, origin);
+        let density = light.density(origin, t + self.passed, triangle);
+        match emitters.choices.is_empty() {
+            true => density,
+            false => density * emitters.expected(index, origin),
+        }
     }
 
     /// Returns `throughput`, limited to 2^60 in each channel. Mirrors that amplify light would let

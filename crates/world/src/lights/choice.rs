@@ -14,6 +14,7 @@
 //! Lights that are much brighter than the others are left out of the choice: shadow rays go to them
 //! from every surface. All lights are in one light group, see [`LightGroups`](crate::LightGroups).
 
+use crate::lights::emitter_choice::MIN_EMITTERS;
 use crate::world::DeltaSource;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -267,28 +268,33 @@ pub(crate) struct ManyLights {
     /// `MIN_LIGHTS` hemispheres. A spot light costs rays at surfaces in its cone only. If the cones
     /// are narrow, few surfaces are in many of them, and all spots together cost few rays.
     spots: bool,
+    /// `true` if the scene has `MIN_EMITTERS` lights with a size or more.
+    surfaces: bool,
 }
 
 impl ManyLights {
     pub fn new<'a>(lights: impl Iterator<Item = &'a Light>) -> Self {
-        let (mut points, mut spots) = (0, 0.0);
+        let (mut points, mut spots, mut surfaces) = (0, 0.0, 0);
         for light in lights {
             match light.form() {
                 LightForm::Point { cone: None, .. } => points += 1,
                 LightForm::Point { cone: Some(spot), .. } => {
                     spots += share(1.0 - spot.outer_angle.to_radians().cos());
                 }
-                LightForm::Distant { .. } | LightForm::Surface(_) | LightForm::Environment(_) => {}
+                LightForm::Surface(_) => surfaces += 1,
+                LightForm::Distant { .. } | LightForm::Environment(_) => {}
             }
         }
-        Self { points: points >= MIN_LIGHTS, spots: spots >= MIN_LIGHTS as f64 }
+        let (points, spots) = (points >= MIN_LIGHTS, spots >= MIN_LIGHTS as f64);
+        Self { points, spots, surfaces: surfaces >= MIN_EMITTERS }
     }
 
     pub fn includes(&self, light: &Light) -> bool {
         match light.form() {
             LightForm::Point { cone: None, .. } => self.points,
             LightForm::Point { cone: Some(_), .. } => self.spots,
-            LightForm::Distant { .. } | LightForm::Surface(_) | LightForm::Environment(_) => false,
+            LightForm::Surface(_) => self.surfaces,
+            LightForm::Distant { .. } | LightForm::Environment(_) => false,
         }
     }
 }

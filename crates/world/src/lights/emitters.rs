@@ -13,14 +13,16 @@
 
 use crate::integrator::coincident_surfaces::{first_primitives, touching_pairs};
 use crate::lights::emissive_forms::surface_of;
+use crate::lights::emitter_choice::{Cells, EmitterBounds, EmitterChoice, MIN_EMITTERS};
 use crate::lights::groups::{GroupedSource, LightGroupSource, LightGroups};
 use crate::world::LightSource;
-use std::collections::{HashMap, HashSet};
+use glam::DVec3;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3, distinct};
+use zerkalo_kernel::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, distinct};
 use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId};
 use zerkalo_scene::Scene;
-use zerkalo_scene::light::{Emitter, LightSample};
+use zerkalo_scene::light::{Emitter, EmitterTable, LightSample, lanes_with};
 use zerkalo_scene::material::Material;
 
 /// Largest distance behind the surface of a touching object at which points of an emissive object
@@ -48,6 +50,20 @@ pub(crate) struct Emitters<S> {
     primitives: Vec<u32>,
     /// Height above the surface of an emissive object at which its points are sampled.
     lift: S,
+    /// Choices that together have every emitter whose points are sampled, if there are many.
+    pub choices: Vec<EmitterChoice<S>>,
+    /// For each of these emitters, its choice and its place there.
+    place_of: Vec<(u32, u32)>,
+    table: EmitterTable<S>,
+}
+
+/// Emitters on which a packet has sampled points.
+#[derive(Clone, Copy)]
+pub(crate) enum Sampled<'a> {
+    /// Number of the only emitter.
+    One(usize),
+    /// Number of the emitter in each lane.
+    Each(&'a [u32; MAX_WIDTH]),
 }
 
 /// Object that touches an emissive one.
@@ -114,7 +130,115 @@ impl<S: Float> Emitters<S> {
         let mut sources = lights;
         sources.extend(compiled.into_iter().map(|(_, source)| source));
         let lift = S::from_f64(lift);
-        Self { sources, lights: lights_len, sampled, source_of, touching, primitives, lift }
+        let emitters = Self {
+            sources,
+            lights: lights_len,
+            sampled,
+            source_of,
+            touching,
+            primitives,
+            lift,
+            ..Self::default()
+        };
+        match sampled >= MIN_EMITTERS {
+            true => emitters.with_choices(forms),
+            false => emitters,
+        }
+    }
+
+    /// Adds the choices among emitters: one for each light group and one for each distant light.
+    fn with_choices(mut self, forms: &[Form]) -> Self {
+        let emission = |i: usize| {
+            self.sources[i]
+                .emission
+                .map_or(1.0, |e| e.map(S::to_f64).into_iter().fold(0.0, f64::max))
+        };
+        let mut groups: BTreeMap<(usize, usize), Vec<(u32, EmitterBounds)>> = BTreeMap::new();
+        let sampled = self.sources[..self.sampled].iter().enumerate();
+        for (i, source) in sampled {
+            let Some(light) = &source.light else { continue };
+            let distant = if light.is_distant() { i + 1 } else { 0 };
+            let ball = BoundingSphere { center: light.center, radius: light.radius };
+            let normal = light.normal();
+            // A convex solid shows a quarter of its surface on average.
+            let shown = if normal.is_some() { 1.0 } else { 0.25 };
+            let power = light.radiance.to_f64() * light.area.min(f64::MAX) * emission(i) * shown;
+            let bounds = EmitterBounds { ball, normal, power };
+            groups.entry((source.group, distant)).or_default().push((i as u32, bounds));
+        }
+        let boxes = || forms.iter().filter_map(|form| form.bounds());
+        let low = boxes().map(|b| b.0).reduce(DVec3::min).unwrap_or_default();
+        let high = boxes().map(|b| b.1).reduce(DVec3::max).unwrap_or_default();
+        self.place_of = vec![(0, 0); self.sampled];
+        for mut list in groups.into_values() {
+            let largest = list.iter().map(|(_, bounds)| bounds.power).fold(0.0, f64::max);
+            for (_, bounds) in &mut list {
+                // Relative to the largest, so that no sum overflows.
+                bounds.power = (bounds.power / largest).clamp(1e-9, 1.0);
+            }
+            let mut choice = EmitterChoice::new(list, (low, high));
+            let sources = || choice.emitters().iter().map(|number| &self.sources[*number as usize]);
+            let all_visible = sources().all(|source| source.visible);
+            let colored = sources().any(|source| source.emission.is_some());
+            (choice.all_visible, choice.colored) = (all_visible, colored);
+            for (emitter, place) in choice.emitters().iter().zip(0..) {
+                self.place_of[*emitter as usize] = (self.choices.len() as u32, place);
+            }
+            self.choices.push(choice);
+        }
+        self.table = EmitterTable::new(self.sampled());
+        self
+    }
+
+    fn sampled(&self) -> impl Iterator<Item = &Emitter<S>> {
+        self.sources[..self.sampled].iter().filter_map(|source| source.light.as_ref())
+    }
+
+    /// Samples a point of an emitter of `choice` for each of the receivers at `origin`, which are in
+    /// `cells`. `way` and `numbers` are those of [`EmitterChoice::choose`]. Returns the emitters, and
+    /// the sample. Its density is for multiple importance sampling, if this is `weighted`: that of the
+    /// emitter times [`Self::expected`], zero if rays do not see the emitter.
+    #[inline(never)]
+    pub fn sample_chosen<L: SimdFloat<Scalar = S>>(
+        &self,
+        choice: &EmitterChoice<S>,
+        (cells, way): (&Cells, usize),
+        origin: Vec3<L>,
+        (numbers, weighted): ((L, L), bool),
+    ) -> (LightSource<LightSample<L>, S>, [u32; MAX_WIDTH]) {
+        let chosen = choice.choose(&cells.facing, way, numbers);
+        let source = |i: usize| &self.sources[chosen.emitters[i] as usize];
+        let emitter = |number: u32| self.sources[number as usize].light.as_ref();
+        let mut light = self.table.sample(&chosen.emitters, origin, chosen.numbers, emitter);
+        let inverse = L::one() / chosen.expected;
+        // Stays finite, because infinity times a black reflectance would be NaN.
+        light.irradiance = light.irradiance * inverse;
+        light.irradiance = light.irradiance.min(Vec3::of([L::MAX; 3]));
+        if weighted {
+            let expected =
+                |i| S::from_f64(choice.expected(cells.all[i], chosen.places[i] as usize));
+            light.density = (light.density * L::from_fn(expected)).min(L::from_f64(L::MAX));
+        }
+        if choice.colored {
+            let one = [S::from_f64(1.0); 3];
+            let emission = Vec3::from_fn(|i| source(i).emission.unwrap_or(one));
+            light.irradiance = light.irradiance.component_mul(emission);
+        }
+        if !choice.all_visible {
+            let visible = |i: usize| S::from_f64(f64::from(source(i).visible));
+            light.density = light.density.masked(L::from_fn(visible).gt(L::zero()));
+        }
+        let LightSource { group, .. } = self.sources[choice.emitters()[0] as usize];
+        let source = LightSource { light, group, emission: None, visible: true };
+        (source, chosen.emitters)
+    }
+
+    /// Returns the factor of the density of emitter number `index` for receivers that choose: the
+    /// mean number of samples over the directions that they may face.
+    #[inline(always)]
+    pub fn expected<L: SimdFloat<Scalar = S>>(&self, index: usize, receivers: Vec3<L>) -> L {
+        let Some((choice, place)) = self.place_of.get(index) else { return L::one() };
+        self.choices[*choice as usize].expected_at(receivers, *place)
     }
 
     /// Samples a point of the emitter with the number `index` for each of the receivers at
@@ -128,6 +252,26 @@ impl<S: Float> Emitters<S> {
     ) -> Option<LightSource<LightSample<L>, S>> {
         let source = self.sources[..self.sampled].get(index)?;
         Some(source.with_light(source.light.as_ref()?.sample(origin, numbers)))
+    }
+
+    /// Calls `test` with each emitter of `sampled` that is an object, and with its lanes.
+    #[inline(always)]
+    pub fn for_objects<L: SimdFloat<Scalar = S>>(
+        &self,
+        sampled: Sampled<'_>,
+        mut test: impl FnMut(usize, L::Mask),
+    ) {
+        match sampled {
+            Sampled::One(index) => test(index, L::mask(true)),
+            Sampled::Each(_) if self.primitives.is_empty() => {}
+            Sampled::Each(chosen) => {
+                for lane in 0..L::WIDTH {
+                    if !chosen[..lane].contains(&chosen[lane]) {
+                        test(chosen[lane] as usize, lanes_with::<L>(chosen, chosen[lane]));
+                    }
+                }
+            }
+        }
     }
 
     /// Returns the lanes of `lanes` whose point at `distance` along `ray`, which was sampled on
@@ -202,11 +346,39 @@ impl<S: Float> Emitters<S> {
         (self.sources.len() - self.lights, self.sources.len() - self.sampled)
     }
 
-    /// Returns the emission of `primitive`. Returns `None` if it emits nothing.
+    /// Returns the number and the emission of `primitive`. Returns `None` if it emits nothing.
     #[inline(always)]
-    pub fn of_primitive(&self, primitive: u32) -> Option<&EmissiveSource<S>> {
-        let source = *self.source_of.get(primitive as usize)?;
-        Some(&self.sources[source? as usize])
+    pub fn of_primitive(&self, primitive: u32) -> Option<(usize, &EmissiveSource<S>)> {
+        let source = (*self.source_of.get(primitive as usize)?)? as usize;
+        Some((source, &self.sources[source]))
+    }
+
+    /// Calls `seen` for each visible light with a size that `ray` may meet before `t_max` in
+    /// `lanes`.
+    #[inline(always)]
+    pub fn for_visible_lights<L: SimdFloat<Scalar = S>>(
+        &self,
+        ray: &Ray<L>,
+        (t_max, lanes): (L, L::Mask),
+        mut seen: impl FnMut(usize, &Emitter<S>, &EmissiveSource<S>),
+    ) {
+        let mut see = |index: usize| {
+            let source = &self.sources[index];
+            if let Some(light) = source.light.as_ref().filter(|_| source.visible) {
+                seen(index, light, source);
+            }
+        };
+        if self.choices.is_empty() {
+            (0..self.lights).for_each(see);
+        } else if self.lights > 0 {
+            for choice in &self.choices {
+                choice.near_rays(ray, (t_max, lanes), |index| {
+                    if (index as usize) < self.lights {
+                        see(index as usize);
+                    }
+                });
+            }
+        }
     }
 
     /// Returns the visible lights with a size, which are not part of the geometry: rays pass
@@ -217,10 +389,15 @@ impl<S: Float> Emitters<S> {
         visible.filter_map(|source| Some((source.light.as_ref()?, source)))
     }
 
-    /// Returns a sphere around each emitter from which light is sampled.
-    pub fn balls(&self) -> impl Iterator<Item = BoundingSphere> {
-        let emitters = self.sources.iter().filter_map(|source| source.light.as_ref());
-        emitters.map(|light| BoundingSphere { center: light.center, radius: light.radius })
+    /// Returns a sphere around each emitter from which light is sampled, or around the emitters of
+    /// each choice.
+    pub fn balls(&self) -> Vec<BoundingSphere> {
+        if !self.choices.is_empty() {
+            return self.choices.iter().map(EmitterChoice::ball).collect();
+        }
+        let ball =
+            |light: &Emitter<S>| BoundingSphere { center: light.center, radius: light.radius };
+        self.sampled().map(ball).collect()
     }
 }
 

@@ -6,6 +6,7 @@
 pub(crate) mod choice;
 pub(crate) mod emissive_forms;
 pub(crate) mod emissive_sheets;
+pub(crate) mod emitter_choice;
 pub(crate) mod emitters;
 pub(crate) mod groups;
 pub(crate) mod on_surfaces;
