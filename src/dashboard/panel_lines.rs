@@ -221,6 +221,8 @@ pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
 fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     // A `subject` that no longer exists has no fields.
     let mut rows = rows(scene, subject).unwrap_or_default();
+    // The outline has the parts of compounds.
+    rows.retain(|row| !row.key.ends_with(".of"));
     if let Target::Material(_) = subject {
         rows.sort_by_key(|row| common(row).unwrap_or(COMMON.len()));
     }

@@ -116,7 +116,7 @@ fn mesh_before_a_rougher_mirror_is_compared_in_thirty_keys() {
     let path = folder.path().join("duck.obj");
     std::fs::write(&path, ball_of_2000_triangles()).unwrap();
     let mut desk = Desk::new(&ROOM.replace("roughness = 0.05", "roughness = 0.0"));
-    let keys = "a `mesh` Enter `duck.obj` Enter Home Enter / `rough` Enter k `.3` Enter C";
+    let keys = "a `mesh` Enter `duck.obj` Enter Home Enter / `ro mi` Enter k `.3` Enter C";
     assert!(count(keys) <= 30, "{} keys", count(keys));
     let (before, after) = keys.split_once("Home").unwrap();
     desk.keys(&before.replace("duck.obj", path.to_str().unwrap()));

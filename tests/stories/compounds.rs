@@ -74,8 +74,8 @@ fn edits_of_parts_keep_comments() {
         ("Down Enter / `rad` Enter `0.5` Enter", FOOT, wider("0.5").as_str()),
         (
             "Down Enter / `mat` Enter Enter `red` Enter",
-            "    { shape.cyl",
-            "    { material = \"red\", shape.cyl",
+            "radius = 0.3 } }, # flat",
+            "radius = 0.3 } , material = \"red\" }, # flat",
         ),
         (
             "Down Down Right Down m `x.5` Enter",

@@ -206,7 +206,7 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::Typing, H::Number], 1, "Enter", "confirm"),
         hint(&[H::Number], 2, "*2 /2 +.1 -=.1", "change it"),
     ]),
-    command("panels", "list the parts of a compound", &[(Outline, "Right")], |c| c.unfold()).available(viewing_or_choosing).hints(&[hint(&[H::In(Outline)], 8, "Right Left", "parts")]),
+    command("panels", "list the parts of a compound", &[(Outline, "Right")], |c| c.unfold()).hints(&[hint(&[H::In(Outline)], 8, "Right Left", "parts")]),
     command("panels", "hide the parts, select the whole", &[(Outline, "Left")], |c| c.fold()),
     command("panels", "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).available(always).hints(&[
         hint(&[H::In(Outline)], 1, "Up Down", "select"),

@@ -221,7 +221,7 @@ pub fn join(scene: &Scene, targets: &[Target], kind: &str) -> Result<Edit, EditE
 
 /// Replaces a compound by its parts, which keep their place and material. The first one gets its name.
 pub fn dissolve(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
-    let whole = body(scene, target)?;
+    let whole = body(scene, target).map_err(|_| no_compound(scene, target))?;
     let of = whole.shape.parts().ok_or_else(|| no_compound(scene, target))?;
     let mut next = scene.clone();
     let parts = of.iter().map(|part| freed(part, &whole));
