@@ -395,7 +395,7 @@ fn picture_stories() -> Vec<Story> {
         story("zoom fits: the whole picture", "Z Alt-0", |_, d| d.model.zoom.is_none()),
         story("loupe: automatic, always, never", "G", |_, d| d.notice() == "loupe: always"),
         story("next graphics protocol or block characters of the picture", "Alt-#", |_, d| {
-            d.notice().starts_with("graphics auto: cells")
+            d.notice() == "graphics quadrants: quadrants, as chosen"
         }),
         story("probe a pixel", "i", |_, d| {
             d.asked(|e| matches!(e, Effect::View(view) if view.probe == Some([32, 24])))

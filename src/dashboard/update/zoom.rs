@@ -24,7 +24,7 @@ impl UpdateContext<'_> {
         let old = match self.model.zoom {
             Some(zoom) => zoom.steps,
             // The next power of two is a step away.
-            None if steps > 0 => (scale.log2() + 0.1).floor() as i32,
+            None if steps > 0 => (self.model.fitting_scale().log2() + 0.1).floor() as i32,
             None => return self.say("The whole picture is visible already"),
         };
         let new = (old + steps).min(LARGEST);

@@ -119,7 +119,11 @@ fn picture_conversion_time() {
         for seed in 0..20 {
             let raster = Raster::from_fn(width, height, |i| {
                 let noise = (i.wrapping_mul(2_654_435_761).wrapping_add(seed) >> 7) as u8 / 8;
-                [noise + (i % width) as u8, noise + (i / width) as u8, 100 + noise]
+                [
+                    noise.wrapping_add((i % width) as u8),
+                    noise.wrapping_add((i / width) as u8),
+                    100 + noise,
+                ]
             });
             let start = std::time::Instant::now();
             std::hint::black_box(convert(&raster));
