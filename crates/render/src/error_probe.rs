@@ -321,7 +321,8 @@ mod tests {
     }
 
     fn rmse(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
-        let square = |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum();
+        let square =
+            |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>();
         (a.iter().zip(b).map(square).sum::<f64>() / (3 * a.len()) as f64).sqrt()
     }
 
