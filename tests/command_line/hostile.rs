@@ -217,26 +217,148 @@ fn files_named_by_meshes_stay_in_their_folder() {
     }
 }
 
+/// Small files that declare, or decode to, more than the address space of the test: name, contents, and
+/// words of the message about them.
+fn bombs() -> Vec<(&'static str, Vec<u8>, &'static str)> {
+    let png_header = |width: u32, height: u32, depth: u8, kind: u8| {
+        let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
+        let chunk = [&b"IHDR"[..], &size, &[depth, kind, 0, 0, 0]].concat();
+        let sum = crc32fast::hash(&chunk).to_be_bytes();
+        [&b"\x89PNG\r\n\x1a\n\0\0\0\x0d"[..], &chunk, &sum, &[0; 9000]].concat()
+    };
+    let sof = |side: u16| {
+        [&[0xff, 0xc0, 0, 11, 8][..], &side.to_be_bytes(), &side.to_be_bytes()].concat()
+    };
+    let jpeg = |side| [&[0xff, 0xd8][..], &sof(side), &[1, 1, 0x11, 0], &[0; 200_000]].concat();
+    let attribute = |name: &str, kind: &str, value: &[u8]| {
+        let length = (value.len() as u32).to_le_bytes();
+        [name.as_bytes(), &[0], kind.as_bytes(), &[0], &length, value].concat()
+    };
+    let exr = |width: i32, height: i32| {
+        let channel = |name: u8| [&[name, 0, 1][..], &[0; 7], &[1, 0, 0, 0, 1, 0, 0, 0]].concat();
+        let channels = [&channel(b'B')[..], &channel(b'G'), &channel(b'R'), &[0]].concat();
+        let window = [0, 0, width - 1, height - 1].map(i32::to_le_bytes).concat();
+        let one = 1f32.to_le_bytes();
+        let header = [
+            attribute("channels", "chlist", &channels),
+            attribute("compression", "compression", &[3]),
+            attribute("dataWindow", "box2i", &window),
+            attribute("displayWindow", "box2i", &window),
+            attribute("lineOrder", "lineOrder", &[0]),
+            attribute("pixelAspectRatio", "float", &one),
+            attribute("screenWindowCenter", "v2f", &[0; 8]),
+            attribute("screenWindowWidth", "float", &one),
+        ];
+        [&[0x76, 0x2f, 0x31, 1, 2, 0, 0, 0][..], &header.concat(), &[0; 9000]].concat()
+    };
+    let hdr = |width: u32, height: u32| {
+        let row = [[9; 4], [1, 1, 1, 255], [1, 1, 1, 63]].concat();
+        [format!("#?RADIANCE\n\n-Y {height} +X {width}\n").as_bytes(), &row.repeat(500)].concat()
+    };
+    let ply = |format: &str, count: u32| {
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\
+             property float z\nelement face {count}\nproperty list uint int vertex_indices\nend_header\n"
+        )
+    };
+    let list = [ply("binary_little_endian", 1).into_bytes(), vec![0; 12], vec![0xff; 4]].concat();
+    let gltf = |count: u32, bytes: u32, copies: usize| {
+        let repeated = |item: &str| vec![item; copies].join(",");
+        let zeros = "A".repeat(4 * bytes.min(120_000).div_ceil(3) as usize);
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},
+            "buffers":[{{"byteLength":{bytes},"uri":"data:application/octet-stream;base64,{zeros}"}}],
+            "bufferViews":[{{"buffer":0,"byteLength":{bytes}}}],
+            "accessors":[{{"bufferView":0,"componentType":5126,"count":{count},"type":"VEC3"}}],
+            "meshes":[{{"primitives":[{}]}}],"nodes":[{}],"scenes":[{{"nodes":[{}]}}],"scene":0}}"#,
+            repeated(r#"{"attributes":{"POSITION":0}}"#),
+            repeated(r#"{"mesh":0}"#),
+            (0..copies).map(|i| i.to_string()).collect::<Vec<_>>().join(","),
+        )
+    };
+    let glb_json =
+        gltf(3, 36, 1).replace(r#","uri":"data:application/octet-stream;base64,"#, r#","x":""#);
+    let length = (glb_json.len() as u32).to_le_bytes();
+    let glb = [
+        &b"glTF\x02\0\0\0\xff\xff\xff\xff"[..],
+        &length,
+        b"JSON",
+        glb_json.as_bytes(),
+        &[0xf0, 0xff, 0xff, 0xff],
+        b"BIN\0",
+    ]
+    .concat();
+    let (memory, size) = (" MB are available (the limit on address space", "the image has ");
+    vec![
+        ("deep.png", png_header(8000, 8000, 16, 6), memory),
+        ("sky-deep.png", png_header(8000, 8000, 16, 6), size),
+        ("huge.png", png_header(1 << 30, 1 << 30, 8, 2), "too large"),
+        ("big.jpg", jpeg(8000), memory),
+        ("huge.jpg", jpeg(65_535), size),
+        ("sky.hdr", hdr(16_384, 2000), memory),
+        ("sky-huge.hdr", hdr(2_147_483_647, 2_147_483_647), size),
+        ("sky.exr", exr(8192, 4096), memory),
+        ("sky-huge.exr", exr(1 << 30, 1 << 30), "window size"),
+        ("many.ply", ply("ascii", 4_000_000_000).into(), "more than the file holds"),
+        (
+            "many-bytes.ply",
+            ply("binary_big_endian", 4_000_000_000).into(),
+            "more than the file holds",
+        ),
+        ("list.ply", list, "a list has 4294967295 values"),
+        ("many.stl", [vec![0; 80], vec![0xff; 4]].concat(), "4294967295 triangles"),
+        ("lists.stl", format!("solid\n{}", "facet normal 0 0 1\n".repeat(9)).into(), "lists.stl"),
+        ("copies.gltf", gltf(9000, 108_000, 100).into(), memory),
+        ("claim.gltf", gltf(357_913_941, u32::MAX - 3, 1).into(), "do not lie in their buffer"),
+        ("claim.glb", glb, "claim.glb"),
+        (
+            "corner.obj",
+            format!("v 0 0 0\n{}f 1 2 4000000000\n", "v 1 0 0\n".repeat(9)).into(),
+            "4000000000",
+        ),
+        ("nested.toml", format!("x = {}", "[".repeat(900_000)).into(), "recurs"),
+        ("keys.toml", format!("{}a = 1", "a.".repeat(400_000)).into(), "recursion limit"),
+    ]
+}
+
+/// Checks under a limit on address space that small files which declare gigabytes are refused with a
+/// located message by every command that reads them. No allocation may fail.
 #[test]
-fn sizes_are_checked_before_allocation() {
+#[cfg(target_os = "linux")]
+fn small_files_that_declare_gigabytes_are_refused() {
     let desk = Desk::new();
-    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n\
-                  property float x\nproperty float y\nproperty float z\nelement face 4000000000\n\
-                  property list uchar int vertex_indices\nend_header\n";
-    fs::write(desk.path("m.ply"), header).unwrap();
-    let mut stl = vec![0; 80];
-    stl.extend(u32::MAX.to_le_bytes());
-    fs::write(desk.path("m.stl"), stl).unwrap();
-    for name in ["m.ply", "m.stl"] {
-        fs::write(desk.path("mesh.toml"), with_mesh(name)).unwrap();
-        // The limit of 2 GB leaves memory for the message only if the mesh is refused early.
-        let program = env!("CARGO_BIN_EXE_zerkalo");
-        let mut command = Command::new("sh");
-        command.arg("-c").arg(format!("ulimit -v 2000000; exec '{program}' check mesh.toml"));
-        let run = Run::from(command.current_dir(desk.0.path()).output().unwrap());
-        assert_eq!(run.status, 1, "{name}: {}", run.err);
-        assert!(run.err.contains(name), "{name}: {}", run.err);
+    let limited = |command: &str| {
+        let script = format!("ulimit -v 600000; exec timeout 60 \"$0\" {command}");
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &script, env!("CARGO_BIN_EXE_zerkalo")]).current_dir(desk.0.path());
+        let run = Run::from(shell.output().unwrap());
+        assert_eq!(run.status, 1, "{command}: {} {}", run.out, run.err);
+        assert!(!run.err.contains("panicked"), "{command}: {}", run.err);
+        run.err
+    };
+    for (name, bytes, words) in bombs() {
+        fs::write(desk.path(name), bytes).unwrap();
+        let scene = match name.rsplit_once('.').unwrap() {
+            (_, "toml") => name.to_string(),
+            (stem, "png" | "jpg") if !stem.starts_with("sky") => {
+                format!("{SCENE}[materials.m]\ntexture.image.file = \"{name}\"\n")
+            }
+            (_, "png" | "hdr" | "exr") => {
+                format!("{SCENE}[[light]]\nenvironment.file = \"{name}\"\n")
+            }
+            (..) => with_mesh(name),
+        };
+        let scene_file = if scene == name { name } else { "bomb.toml" };
+        if scene != name {
+            fs::write(desk.path(scene_file), scene).unwrap();
+        }
+        for command in ["check SCENE", "render SCENE -o a.png --spp 2 --size 16x12 --threads 1"] {
+            let message = limited(&command.replace("SCENE", scene_file));
+            assert!(message.contains(name) && message.contains(words), "{name}: {message}");
+        }
     }
+    let message = limited("measure scene.toml --seconds 1 --reference sky.exr");
+    assert!(message.contains("sky.exr: it needs ") && message.contains("expected"), "{message}");
 }
 
 /// Checks that a scene or mesh that does not fit into the address space is refused. The address

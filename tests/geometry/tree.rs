@@ -39,7 +39,7 @@ fn compare<L: SimdFloat>(seed: u64, count: usize, forms: &[Form], lines: &[Line]
         AccelerationStructure::Boxes { oriented: true },
         AccelerationStructure::Boxes { oriented: false },
     ] {
-        let other = Aggregate::<L>::with_structure(forms, structure, |_| false);
+        let other = Aggregate::<L>::with_structure(forms, structure);
         compare_with(seed, (structure, count), (&list, &other), lines);
     }
 }

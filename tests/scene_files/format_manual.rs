@@ -53,7 +53,8 @@ and every key with a default may be left out. Unknown keys are errors.
   `acceleration`, number of threads or SIMD width. To decide it, move one of them by a thousandth of its
   size, or make one compound of both, which shows the part listed first. From outside, contact of two
   opaque solids is hidden; an eye inside of one of them sees it. In the same way rounding decides on
-  which side an eye is that lies exactly on a surface.
+  which side an eye is that lies exactly on a surface. Of objects with the same shape, place and material
+  the last one stands for all, except for open transparent ones, which attenuate light one by one.
 - A light on a surface, within rounding, acts as a light at a vanishing distance from it, on the side
   of the lit point. So a light on the ceiling lights all of the room; the surface itself stays dark.
   A solid occludes what is behind it. An open surface (plane, platform, rectangle) has no inside, so

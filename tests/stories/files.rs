@@ -273,3 +273,113 @@ fn image_viewer_closes_on_any_key() {
     desk.keys("o Ctrl-c");
     assert!(desk.asked(|e| *e == Effect::Quit));
 }
+
+/// Files about each of which a reader has a note: name, contents, and the note.
+fn noted_files() -> Vec<(&'static str, Vec<u8>, &'static str)> {
+    let obj = |lines: &str| format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n{lines}").into_bytes();
+    let ply = |lines: &str, end: &str| {
+        format!(
+            "ply\nformat ascii 1.0\n{lines}element vertex 3\nproperty float x\nproperty float y\n\
+             property float z\n{end}element face 1\nproperty list uchar int vertex_indices\n\
+             end_header\n0 0 0 9\n1 0 0 9\n0 1 0 9\n3 0 1 2\n"
+        )
+    };
+    let stl = [&[0; 80][..], &[1, 0, 0, 0], &[0; 12]].concat();
+    let corners = [[0f32; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(|c| c.map(f32::to_le_bytes));
+    let stl = [&stl[..], corners.as_flattened().as_flattened(), &[0, 0x80]].concat();
+    let gltf = |node: &str, primitives: &str, more: &str| {
+        let data = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+        let part = r#"{"attributes":{"POSITION":0}}"#;
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":36,
+            "uri":"data:application/octet-stream;base64,{data}"}}],
+            "bufferViews":[{{"buffer":0,"byteLength":36}}],
+            "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],
+            "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
+            "meshes":[{{"primitives":[{part},{primitives}]}}],"nodes":[{{"mesh":0{node}}}],
+            "scenes":[{{"nodes":[0]}}],"scene":0{more}}}"#
+        )
+        .replace(",]", "]")
+        .into_bytes()
+    };
+    let jpeg = include_bytes!("../images/grey.jpg");
+    let sky = |pixel: &[u8]| [b"#?RGBE\n\n-Y 1 +X 2\n", pixel, &[128; 4]].concat();
+    vec![
+        ("a.obj", obj("l 1 2\n"), "points and lines were left out"),
+        ("b.obj", obj("surf 0 1 0 1 1\n"), "curves and free-form surfaces were left out"),
+        ("c.obj", obj("v 0 0 1 1 0 0\n"), "a colour of a vertex was not read"),
+        ("d.obj", obj("f 1 2 2\n"), "a triangle without area was left out"),
+        ("e.obj", obj("f 2 3 1\n"), "a triangle that equals another one was left out"),
+        ("f.obj", obj("f 1 2\n"), "a face of fewer than three corners was left out"),
+        ("g.obj", obj("v 1 1 0\nf 1 4 2 3\n"), "a polygon whose outline crosses itself"),
+        ("h.obj", obj("mtllib none.mtl\n"), "no colours: none.mtl"),
+        ("i.obj", obj("mtllib ../x.mtl\n"), "no colours: \"../x.mtl\" is not in the mesh's folder"),
+        ("j.obj", obj("usemtl red\nf 3 2 1\n"), "a material that no library before it defines"),
+        ("k.obj", obj("mtllib bad.mtl\n"), "a colour of a material cannot be read"),
+        ("l.obj", obj("mtllib map.mtl\n"), "a texture of a material was not read"),
+        ("m.obj", obj("vt nan 0\nf 1/1 3/1 2/1\n"), "texture coordinates that are no numbers"),
+        ("n.obj", obj("vn 0 0 1\nf 1//1 3//1 2//1\n"), "a normal that is missing was computed"),
+        ("a.ply", ply("", "property uchar red\n").into(), "the colours of vertices or faces"),
+        ("b.ply", ply("comment TextureFile t.png\n", "property float w\n").into(), "a texture was"),
+        ("a.stl", stl, "a colour of a triangle was not read"),
+        (
+            "a.gltf",
+            gltf(r#","extensions":{"EXT_mesh_gpu_instancing":{}}"#, "", ""),
+            "the instances of a node were not read",
+        ),
+        ("b.gltf", gltf(r#","skin":0"#, "", ""), "the joints of a skin were not read"),
+        (
+            "c.gltf",
+            gltf("", "", r#","extensionsRequired":["KHR_materials_unlit"]"#),
+            "the extension KHR_materials_unlit was not applied",
+        ),
+        ("d.gltf", gltf("", r#"{"attributes":{"POSITION":0},"mode":1}"#, ""), "points and lines"),
+        ("e.gltf", gltf("", r#"{"attributes":{}}"#, ""), "a part without positions was left out"),
+        (
+            "f.gltf",
+            gltf("", r#"{"attributes":{"POSITION":0,"COLOR_0":0}}"#, ""),
+            "the colours of the vertices of a part were not read",
+        ),
+        (
+            "g.gltf",
+            gltf("", r#"{"attributes":{"POSITION":0},"material":0}"#, ""),
+            "the base colour texture of a part was not read",
+        ),
+        ("a.hdr", sky(&[255; 4]), "pixels that are infinite or above 1e15, taken as 65504"),
+        ("a.jpg", [&jpeg[..jpeg.len() - 60], &[0; 4000]].concat(), "the file has no end"),
+    ]
+}
+
+/// Checks that `check`, `render` and the dashboard show every note of a reader.
+#[test]
+fn every_note_of_a_reader_is_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("bad.mtl"), "newmtl a\nKd x\n").unwrap();
+    fs::write(path("map.mtl"), "newmtl a\nmap_Kd t.png\n").unwrap();
+    let mut all = String::from("ambient.color = [1, 1, 1]\n");
+    let files = noted_files();
+    for (name, contents, note) in &files {
+        fs::write(path(name), contents).unwrap();
+        let file = path(name);
+        let part = match name.rsplit('.').next() {
+            Some("hdr") => format!("[[light]]\nenvironment.file = {file:?}\n"),
+            Some("jpg") => format!("[materials.jpg]\ntexture.image.file = {file:?}\n"),
+            _ => format!("[[object]]\nshape.mesh.file = {file:?}\n"),
+        };
+        let model = start(Some(FILE), &(ROOM.to_string() + &part));
+        let notice = model.notice.as_ref().map_or("", |n| &n.text);
+        assert!(notice.contains(&format!("{name}\": {note}")), "{name}: {notice}");
+        all += &part;
+    }
+    fs::write(path("all.toml"), all).unwrap();
+    for args in ["check all.toml", "render all.toml -o a.png --size 16x12 --spp 1 --threads 1"] {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_zerkalo"));
+        let run = command.args(args.split(' ')).current_dir(folder.path()).output().unwrap();
+        let printed = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{args}: {printed}");
+        for (name, _, note) in &files {
+            assert!(printed.contains(&format!("{name}\": {note}")), "{args}, {name}: {printed}");
+        }
+    }
+}

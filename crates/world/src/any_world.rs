@@ -50,13 +50,15 @@ pub enum AnyWorld {
 
 /// Returns `true` if [`Precision::Auto`] chooses double precision for `scene`.
 pub fn requires_double(scene: &Scene) -> bool {
-    !single_suffices(scene, &RecenteredGeometry::new(scene))
+    let (scene, geometry) = RecenteredGeometry::of_distinct(scene);
+    !single_suffices(&scene, &geometry)
 }
 
 impl AnyWorld {
     /// Compiles `scene`, which must have no validation errors, with the given options.
     pub fn compile(scene: &Scene, options: &Options) -> Self {
-        let geometry = RecenteredGeometry::new(scene);
+        let (scene, geometry) = RecenteredGeometry::of_distinct(scene);
+        let scene = &*scene;
         let single = match options.precision {
             Precision::Single => true,
             Precision::Double => false,

@@ -16,6 +16,7 @@ use crate::lights::groups::{LightGroupSource, LightGroups};
 use crate::lights::on_surfaces::{OnSurface, WRITTEN};
 use crate::world::{DeltaSource, EnvironmentSource, ShadowRayTarget, World, WorldInfo};
 use glam::{DAffine3, DVec3};
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use zerkalo_kernel::lanes::{Float, SimdFloat};
 use zerkalo_kernel::primitive::{
@@ -35,9 +36,39 @@ pub(crate) struct RecenteredGeometry {
     /// Largest absolute coordinate, relative to `origin`, of the camera's lens and of all shapes
     /// with finite bounds.
     pub extent: f64,
+    /// Number of the object of each form in the scene file.
+    pub objects: Vec<u32>,
 }
 
 impl RecenteredGeometry {
+    /// Returns `scene` without objects that are hidden, because a later one has their shape, place
+    /// and material, and its geometry. Open transparent surfaces stay: each attenuates light.
+    pub fn of_distinct(scene: &Scene) -> (Cow<'_, Scene>, Self) {
+        let geometry = Self::new(scene);
+        let transmits = |name| scene.materials.get(name).is_some_and(|m| m.transmission > 0.0);
+        let mut last_at = HashMap::new();
+        let is_hidden = |i: &usize| {
+            let form = &geometry.forms[*i];
+            let corners = form.bounds().map(|(low, high)| [low.to_array(), high.to_array()]);
+            let bits = corners.map(|corners| corners.map(|corner| corner.map(f64::to_bits)));
+            let last = *last_at.entry(bits).or_insert(*i);
+            let [a, b] = [&scene.objects[last], &scene.objects[*i]];
+            last != *i
+                && (&a.shape, &a.transform, &a.material) == (&b.shape, &b.transform, &b.material)
+                && (form.is_solid() || !a.materials().into_iter().any(transmits))
+        };
+        let hidden: HashSet<usize> = (0..geometry.forms.len()).rev().filter(is_hidden).collect();
+        if hidden.is_empty() {
+            return (Cow::Borrowed(scene), geometry);
+        }
+        let kept = || (0..geometry.forms.len()).filter(|i| !hidden.contains(i));
+        let objects = kept().map(|i| scene.objects[i].clone()).collect();
+        let forms = kept().map(|i| geometry.forms[i].clone()).collect();
+        let numbers = kept().map(|i| i as u32).collect();
+        let distinct = Scene { objects, ..scene.clone() };
+        (Cow::Owned(distinct), Self { forms, objects: numbers, ..geometry })
+    }
+
     pub fn new(scene: &Scene) -> Self {
         let forms: Vec<Form> = scene
             .objects
@@ -60,7 +91,8 @@ impl RecenteredGeometry {
             .map(|(low, high)| low.abs().max(high.abs()));
         let lens = (scene_eye - origin).abs() + DVec3::splat(scene.camera.lens_radius());
         let extent = farthest_corners.fold(lens, DVec3::max).max_element();
-        Self { origin, forms, extent }
+        let objects = (0..forms.len() as u32).collect();
+        Self { origin, forms, extent, objects }
     }
 
     /// Returns the largest rounding error of the coordinates in the scene file.
@@ -364,11 +396,7 @@ fn outside_only<L: SimdFloat>(
 }
 
 /// Compiles `forms`, with the acceleration structure that the scene selects.
-fn aggregate<L: SimdFloat>(
-    scene: &Scene,
-    forms: &[Form],
-    materials: &CompiledMaterials<L::Scalar>,
-) -> Aggregate<L> {
+fn aggregate<L: SimdFloat>(scene: &Scene, forms: &[Form]) -> Aggregate<L> {
     let structure = match scene.trace.acceleration {
         Acceleration::Auto => AccelerationStructure::fastest(forms),
         Acceleration::None => AccelerationStructure::List("bare list"),
@@ -377,35 +405,7 @@ fn aggregate<L: SimdFloat>(
         Acceleration::Aabb => AccelerationStructure::Boxes { oriented: false },
         Acceleration::Bvh => AccelerationStructure::Bvh,
     };
-    let duplicates = duplicates(scene, forms, materials);
-    Aggregate::with_structure(forms, structure, |form| duplicates.contains(&form))
-}
-
-/// Returns the objects with the shape, the place and the materials of an earlier object, if these
-/// materials are opaque and do not emit. Rays see only the earlier object.
-fn duplicates<S: Float>(
-    scene: &Scene,
-    forms: &[Form],
-    materials: &CompiledMaterials<S>,
-) -> HashSet<usize> {
-    let mut first_at = HashMap::new();
-    let is_duplicate = |i: &usize| {
-        let corners = forms[*i].bounds().map(|(low, high)| [low, high].map(|v| v.to_array()));
-        let bits = corners.map(|corners| corners.map(|corner| corner.map(f64::to_bits)));
-        let first = *first_at.entry(bits).or_insert(*i);
-        let [a, b] = [&scene.objects[first], &scene.objects[*i]];
-        let of_object = &materials.of_object;
-        let is_plain = |m: &u32| {
-            let m = *m as usize;
-            materials.bsdfs[m].transmission.is_none() && !materials.materials[m].emits()
-        };
-        first != *i
-            && a.shape == b.shape
-            && a.transform == b.transform
-            && of_object[first] == of_object[*i]
-            && of_object[*i].iter().all(is_plain)
-    };
-    (0..forms.len()).filter(is_duplicate).collect()
+    Aggregate::with_structure(forms, structure)
 }
 
 /// Returns a sphere around the eye that contains the lens and every start point on the near plane.
@@ -425,7 +425,8 @@ fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> BoundingSphere {
 impl<L: SimdFloat> World<L> {
     /// Compiles `scene`, which must have no validation errors.
     pub fn new(scene: &Scene) -> Self {
-        Self::compile(scene, &RecenteredGeometry::new(scene), false)
+        let (scene, geometry) = RecenteredGeometry::of_distinct(scene);
+        Self::compile(&scene, &geometry, false)
     }
 
     pub(super) fn compile(
@@ -454,7 +455,7 @@ impl<L: SimdFloat> World<L> {
         materials: CompiledMaterials<L::Scalar>,
         groups: LightGroups,
     ) -> Self {
-        let geometry = aggregate(scene, &recentered.forms, &materials);
+        let geometry = aggregate(scene, &recentered.forms);
         let primitives = &geometry.sources;
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
         let textures = SurfaceTextures::new(scene, primitives, recentered.origin, |id| {
@@ -484,6 +485,7 @@ impl<L: SimdFloat> World<L> {
             fold: scene.trace.below_horizon == BelowHorizon::Fold,
             nested_dielectrics,
             geometry,
+            objects: recentered.objects.clone(),
             outside_only,
             bsdf_of,
             bsdfs: materials.bsdfs,
@@ -513,23 +515,29 @@ mod tests {
     use super::*;
     use zerkalo_kernel::lanes::Single;
 
-    /// Checks that equal opaque objects share one test of a ray, and that glass, lamps and other
-    /// materials keep theirs.
+    /// Checks that of equal objects the last one remains, and all panes, and that hits have the
+    /// numbers of the scene file.
     #[test]
-    fn equal_opaque_objects_are_tested_once() {
-        let spheres = |keys: &str, count: usize| {
-            let sphere = "shape.sphere = { center = [0, 0, 0], radius = 1 }";
-            let object = format!("[[object]]\nmaterial = \"a\"\n{sphere}\n");
+    fn equal_objects_are_compiled_once() {
+        let count = |keys: &str, shape: &str| {
+            let object = format!("[[object]]\nmaterial = \"a\"\nshape.{shape}\n");
             let other = "[[object]]\nshape.sphere = { center = [9, 0, 0], radius = 1 }\n";
             let text = format!(
-                "ambient.color = [1, 1, 1]\ntrace.acceleration = \"bvh\"\n[materials.a]\n{keys}\n{}{other}",
-                object.repeat(count)
+                "ambient.color = [1, 1, 1]\n[materials.a]\n{keys}\n{}{other}",
+                object.repeat(100)
             );
             let world = World::<Single>::new(&Scene::parse(&text, "test").unwrap());
-            world.geometry.in_bvh().len()
+            assert_eq!(world.objects[world.objects.len() - 2..], [99, 100]);
+            world.geometry.sources.len() - 1
         };
-        assert_eq!(spheres("color = [1, 0, 0]", 100), 2);
-        assert_eq!(spheres("transmission = 0.9\ndiffuse = 0.0", 10), 11);
-        assert_eq!(spheres("emission = 1.0", 10), 11);
+        let sphere = "sphere = { center = [0, 0, 0], radius = 1 }";
+        let platform = "platform = { center = [0, 0, 0], size = [1, 1] }";
+        let plane = "plane = { point = [0, 0, 0], normal = [0, 1, 0] }";
+        let glass = "transmission = 0.9\ndiffuse = 0.0";
+        for keys in ["color = [1, 0, 0]", "emission = 1.0", glass] {
+            let sheets = if keys == glass { 100 } else { 1 };
+            let counts = [sphere, platform, plane].map(|shape| count(keys, shape));
+            assert_eq!(counts, [1, sheets, sheets], "{keys}");
+        }
     }
 }

@@ -61,6 +61,8 @@ pub(super) type EnvironmentSource<S> = LightSource<EnvironmentLight, S>;
 pub struct World<L: SimdFloat> {
     /// All primitives of the scene, in coordinates relative to the scene's centre.
     pub(super) geometry: Aggregate<L>,
+    /// Number of the object of each form in the scene file.
+    pub(super) objects: Vec<u32>,
     /// `true` for each primitive that rays hit only from outside: a convex solid in which no camera
     /// ray starts and no transmitted ray runs.
     pub(super) outside_only: Vec<bool>,

@@ -113,8 +113,8 @@ impl RadianceMap {
                 (file.size, file.pixels(source)?)
             }
             Some(ImageFormat::Png | ImageFormat::Jpeg) => {
+                check(Image::memory(source)?.size)?;
                 let image = Image::parse(source)?;
-                check(image.size())?;
                 let [width, height] = image.size();
                 let row = |y| (0..width).map(move |x| (x, y));
                 let pixels = (0..height).flat_map(row).map(|(x, y)| image.color(x, y)).collect();

@@ -50,7 +50,7 @@ const MOST_PAIRS: usize = 1 << 20;
 
 /// Returns `true` if the errors of single precision would be invisible in the picture of `scene`.
 pub(crate) fn single_suffices(scene: &Scene, geometry: &RecenteredGeometry) -> bool {
-    let RecenteredGeometry { origin, ref forms, extent } = *geometry;
+    let RecenteredGeometry { origin, ref forms, extent, .. } = *geometry;
     let thinnest = forms.iter().map(|form| form.thickness()).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
         return false;

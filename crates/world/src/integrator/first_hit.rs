@@ -60,7 +60,7 @@ fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut 
             let side = if front { 1.0 } else { -1.0 };
             let axis = |c: L| (side * c.lane(lane).to_f64()) as f32;
             *hit = FirstHit {
-                object: Some(source.form as u32),
+                object: Some(world.objects[source.form]),
                 part: source.part as u32,
                 depth: depth.lane(lane).to_f64() as f32,
                 normal: [axis(normal.x), axis(normal.y), axis(normal.z)],

@@ -104,8 +104,8 @@ pub(crate) fn move_off_surfaces(
         moved.get_or_insert_with(|| forms.to_vec())[object] =
             forms[object].clone().transformed(&by);
     }
-    let RecenteredGeometry { origin, extent, .. } = *geometry;
-    moved.map(|forms| RecenteredGeometry { origin, forms, extent })
+    let RecenteredGeometry { origin, extent, ref objects, .. } = *geometry;
+    moved.map(|forms| RecenteredGeometry { origin, forms, extent, objects: objects.clone() })
 }
 
 /// Flat emissive object.

@@ -93,23 +93,18 @@ impl PrimitiveSet {
 impl<L: SimdFloat> Aggregate<L> {
     /// Compiles the canonical forms `forms`, with the fastest structure.
     pub fn new(forms: &[Form]) -> Self {
-        Self::with_structure(forms, AccelerationStructure::fastest(forms), |_| false)
+        Self::with_structure(forms, AccelerationStructure::fastest(forms))
     }
 
     /// Compiles the canonical forms `forms`, with or without a BVH.
     pub fn with_bvh(forms: &[Form], has_bvh: bool) -> Self {
         let list = AccelerationStructure::List("list");
         let structure = if has_bvh { AccelerationStructure::Bvh } else { list };
-        Self::with_structure(forms, structure, |_| false)
+        Self::with_structure(forms, structure)
     }
 
-    /// Compiles the canonical forms `forms`. A BVH leaves out those whose index `is_duplicate`
-    /// accepts: they equal earlier forms, which hide them.
-    pub fn with_structure(
-        forms: &[Form],
-        structure: AccelerationStructure,
-        is_duplicate: impl Fn(usize) -> bool,
-    ) -> Self {
+    /// Compiles the canonical forms `forms`.
+    pub fn with_structure(forms: &[Form], structure: AccelerationStructure) -> Self {
         let (has_bvh, how_listed) = match structure {
             AccelerationStructure::Bvh => (true, "list"),
             AccelerationStructure::List(name) => (false, name),
@@ -123,8 +118,7 @@ impl<L: SimdFloat> Aggregate<L> {
             let index = batches.len();
             if has_bvh && !infinite {
                 counts.push(format!("{label} (tree)"));
-                let is_tested = |id: &PrimitiveId| id.part == 0 && !is_duplicate(id.form);
-                for (i, source) in origins.iter().enumerate().filter(|(_, id)| is_tested(id)) {
+                for (i, source) in origins.iter().enumerate().filter(|(_, id)| id.part == 0) {
                     bounds.extend(forms[source.form].bounds());
                     in_bvh.push((index, i));
                 }

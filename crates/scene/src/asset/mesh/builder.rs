@@ -4,6 +4,7 @@
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, polygon};
+use crate::process_memory::missing_memory;
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 use zerkalo_kernel::primitive::TriangleMesh;
@@ -49,6 +50,11 @@ pub struct Builder<'a> {
 /// Largest number of different notes. Further ones are ignored.
 const MAX_NOTES: usize = 32;
 
+/// Memory of a vertex in bytes: position in both precisions, normal and texture coordinates.
+const VERTEX_BYTES: u64 = 56;
+/// Memory of a triangle in bytes: corners, colour and the counters of equal triangles.
+const TRIANGLE_BYTES: u64 = 32;
+
 impl<'a> Builder<'a> {
     /// Creates a builder without vertices. `source` is the mesh file, which error messages name.
     pub fn new(source: &'a FileContents) -> Self {
@@ -71,6 +77,18 @@ impl<'a> Builder<'a> {
     /// check before that the file is long enough for them.
     pub fn reserve(&mut self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         self.check_limits(vertices, triangles)?;
+        // New capacity of a list that must grow; the old list exists beside the new one.
+        let grown = |[length, more, capacity]: [usize; 3]| match length + more {
+            needed if needed <= capacity => 0,
+            needed => needed.max(2 * capacity) as u64,
+        };
+        let grown_vertices = grown([self.positions.len(), vertices, self.positions.capacity()]);
+        let grown_triangles = grown([self.triangles.len(), triangles, self.triangles.capacity()]);
+        let bytes = VERTEX_BYTES * grown_vertices + TRIANGLE_BYTES * grown_triangles;
+        if let Some(missing) = missing_memory(bytes).filter(|_| bytes > 0) {
+            let found = format!("the mesh of {} vertices or more {missing}", self.positions.len());
+            return Err(self.source.fault(found, "a smaller mesh, or more free memory"));
+        }
         let reserved = self.positions.try_reserve(vertices);
         reserved.and_then(|()| self.triangles.try_reserve(triangles)).map_err(|_| {
             let found = format!("there is no memory for {triangles} triangles");
