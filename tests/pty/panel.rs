@@ -7,7 +7,7 @@ use super::*;
 use crate::command_line::signals::signal;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use zerkalo_terminal::LEAVE;
+use zerkalo_terminal::{ATTRIBUTES, LEAVE};
 
 /// Returns the picture that the tiles in the output show, or `None` if a tile is missing. The first
 /// tile is at the upper left corner.
@@ -96,5 +96,5 @@ fn tiles_show_the_exported_picture() {
     }
     signal("TERM", terminal.process_id());
     let (_, bytes) = terminal.end();
-    assert!(bytes.contains(&format!("\x1b_Gm=0,q=2;\x1b\\{removal}{LEAVE}")));
+    assert!(bytes.contains(&format!("\x1b_Gm=0,q=2;\x1b\\{removal}{ATTRIBUTES}{LEAVE}")));
 }

@@ -9,7 +9,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use icy_sixel::SixelImage;
 use terminal::RequestReply;
-use zerkalo_terminal::LEAVE;
+use zerkalo_terminal::{ATTRIBUTES, LEAVE};
 
 const SIZE: [u16; 2] = [120, 36];
 /// Width and height in [`CELL`].
@@ -109,7 +109,7 @@ fn signal_removes_the_image() {
     let (status, bytes) = terminal.end();
     assert_eq!(status, 143);
     assert!(
-        bytes.ends_with(&format!("\x1b\\{REMOVAL}{LEAVE}")),
+        bytes.ends_with(&format!("\x1b\\{REMOVAL}{ATTRIBUTES}{LEAVE}")),
         "{:?}",
         &bytes[bytes.len() - 200..]
     );

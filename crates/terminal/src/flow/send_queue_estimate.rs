@@ -257,8 +257,10 @@ impl SendQueueEstimate {
     fn filled(&mut self, now: Duration, drained: f64) -> Option<(f64, Duration)> {
         self.grows_at = self.grows_at.max(now + GROWTH_PAUSE[0]);
         self.fills.push((now, drained));
-        self.fills.retain(|(at, _)| now <= *at + LONGEST_SAMPLE);
+        // Before the first measurement, more is sent than the connection can carry: it is not idle.
         let is_first = self.learns_until == Duration::ZERO;
+        let longest = if is_first { MEMORY } else { LONGEST_SAMPLE };
+        self.fills.retain(|(at, _)| now <= *at + longest);
         let &(since, before) = self.fills.get(usize::from(is_first || self.fills.len() > 2))?;
         let span = now - since;
         (span >= SHORTEST_SAMPLE).then(|| ((drained - before) / span.as_secs_f64(), span))
