@@ -22,6 +22,8 @@ pub struct ErrorParts {
     /// Upper limit of the light of paths that the scene's limits cut; infinite without a limit.
     /// `None` if it was not measured.
     pub cut_paths: Option<f64>,
+    /// Number of pixels in which rounding and cut paths were measured.
+    pub probed_pixels: u32,
     /// Error of the integers in the picture file.
     pub quantization: f64,
     /// Light that the model leaves out, such as `no bounces`. It is no part of the total.
@@ -61,10 +63,13 @@ impl ErrorParts {
             Some(value) => format!("{sign}{value:.2}"),
         };
         let (rounding, cut) = (part(self.rounding, ""), part(self.cut_paths, "<= "));
+        let none_found = self.cut_paths == Some(0.0) && self.probed_pixels > 0;
+        let pixels = self.probed_pixels;
+        let found = if none_found { format!(" in {pixels} pixels") } else { String::new() };
         let bits = if self.quantization > 0.1 { ", 8 bits 0.29" } else { "" };
         let semicolon = if self.left_out.is_empty() { "" } else { "; " };
         let left_out = self.left_out.join(", ");
-        format!("rounding {rounding}, cut paths {cut}{bits}{semicolon}{left_out}")
+        format!("rounding {rounding}, cut paths {cut}{found}{bits}{semicolon}{left_out}")
     }
 }
 
@@ -91,6 +96,7 @@ mod tests {
             noise: 0.52,
             rounding: Some(0.01),
             cut_paths: Some(0.04),
+            probed_pixels: 2720,
             quantization: ROUNDING_TO_8_BITS,
             left_out: vec!["no bounces", "no caustics"],
         };
@@ -103,6 +109,8 @@ mod tests {
         let unbounded = ErrorParts { cut_paths: Some(f64::INFINITY), ..parts.clone() };
         assert!(unbounded.to_string().starts_with("error without bound: noise 0.52"));
         assert_eq!((unbounded.largest(), unbounded.is_open()), ("cut paths", true));
+        let uncut = ErrorParts { cut_paths: Some(0.0), ..parts.clone() };
+        assert!(uncut.to_string().contains(", cut paths 0 in 2720 pixels, 8 bits"), "{uncut}");
         let unmeasured = ErrorParts { rounding: None, quantization: 0.0, ..parts };
         let text = "error >= 0.56 levels: noise 0.52, rounding not measured, cut paths <= 0.04; no";
         assert!(unmeasured.to_string().starts_with(text), "{unmeasured}");

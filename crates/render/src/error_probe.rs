@@ -88,19 +88,20 @@ impl ProbeSums {
     /// Returns the RMSE of rounding in a picture of `spp` samples per pixel. `None` before the
     /// first probe.
     pub fn rounding(&self, spp: f64) -> Option<f64> {
-        let square = self.rounding.product + self.rounding.variance / spp.max(1.0);
-        (self.pixels > 0).then(|| (square / f64::from(self.pixels)).max(0.0).sqrt())
+        let random = self.rounding.variance / f64::from(self.pixels) / spp.max(1.0);
+        let systematic = self.systematic_rounding().unwrap_or(0.0);
+        (self.pixels > 0).then(|| systematic.hypot(random.sqrt()))
     }
 
     /// Returns the RMSE of rounding that remains with any number of samples, if it is significant.
     pub fn systematic_rounding(&self) -> Option<f64> {
         let (square, standard_error) = self.rounding.systematic(f64::from(self.pixels));
-        (square > 3.0 * standard_error).then(|| square.sqrt())
+        (square > 2.0 * standard_error).then(|| square.sqrt())
     }
 
-    /// Returns an upper limit of the RMSE of cut paths, two standard errors above the estimate;
-    /// infinite without a bound. `None` before the first probe.
-    pub fn cut_paths(&self) -> Option<f64> {
+    /// Returns an upper limit of the RMSE of cut paths in a picture of `spp` samples per pixel, two
+    /// standard errors above the estimate; infinite without a bound. `None` before the first probe.
+    pub fn cut_paths(&self, spp: f64) -> Option<f64> {
         if self.pixels == 0 {
             return None;
         }
@@ -112,8 +113,10 @@ impl ProbeSums {
             return Some(f64::INFINITY);
         }
         let rest = second * second / (first - second) / (first + second);
-        let (square, standard_error) = self.cut.systematic(f64::from(self.pixels));
-        Some((square.max(0.0) + 2.0 * standard_error).sqrt() * (1.0 + rest))
+        let pixels = f64::from(self.pixels);
+        let (square, standard_error) = self.cut.systematic(pixels);
+        let random = self.cut.variance / pixels / spp.max(1.0);
+        Some((square.max(0.0) + 2.0 * standard_error + random).sqrt() * (1.0 + rest))
     }
 }
 
@@ -360,7 +363,7 @@ mod tests {
         let sums = probe(&mut rendered);
         scene.trace.max_depth = 200;
         let (long, _) = render(&scene, Precision::Auto);
-        let (bound, true_error) = (sums.cut_paths().unwrap(), rmse(&short, &long));
+        let (bound, true_error) = (sums.cut_paths(32.0).unwrap(), rmse(&short, &long));
         assert!((0.9..2.5).contains(&(bound / true_error)), "{bound}, true {true_error}");
     }
 }

@@ -75,15 +75,22 @@ impl Schedule {
         let noise = self.noise?.rmse.levels;
         let (rounding, cut_paths) = self.probed_parts();
         let quantization = self.settings.stop.error.map_or(ROUNDING_TO_8_BITS, |e| e.quantization);
-        Some(ErrorParts { noise, rounding, cut_paths, quantization, left_out: left_out.to_vec() })
+        Some(ErrorParts {
+            noise,
+            rounding,
+            cut_paths,
+            probed_pixels: if self.measurable.cut_paths { self.probe.pixels } else { 0 },
+            quantization,
+            left_out: left_out.to_vec(),
+        })
     }
 
     /// Returns the errors of rounding and of cut paths; `None` for a part that was not measured.
     fn probed_parts(&self) -> (Option<f64>, Option<f64>) {
         let Measurable { rounding, cut_paths, .. } = self.measurable;
-        let measured = self.probe.rounding(self.spp().mean);
-        let rounding = if rounding { measured } else { Some(0.0) };
-        (rounding, if cut_paths { self.probe.cut_paths() } else { Some(0.0) })
+        let (probe, spp) = (&self.probe, self.spp().mean);
+        let rounding = if rounding { probe.rounding(spp) } else { Some(0.0) };
+        (rounding, if cut_paths { probe.cut_paths(spp) } else { Some(0.0) })
     }
 
     /// Returns the noise at which the error meets `target`; if the other parts alone exceed it, the
@@ -111,5 +118,43 @@ impl Schedule {
         let is_early = self.spp().max <= 2 * SAMPLE_ALIGNMENT;
         (is_early && self.measurable.rounding && rounding > ROUNDING_SHARE * target)
             .then_some(rounding)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error_probe::PairedDifference;
+    use crate::schedule::{Settings, Stop};
+
+    /// Checks that the noise has to be smaller if other parts of the error are large, and that a
+    /// part without bound does not let the render go on for ever.
+    #[test]
+    fn error_target_leaves_room_for_rounding_and_cut_paths() {
+        let target = ErrorTarget { levels: 0.6, quantization: 0.3 };
+        let stop = Stop { error: Some(target), ..Stop::default() };
+        let mut schedule = Schedule::new(&[256; 4], Settings::new(true, stop));
+        schedule.measurable = Measurable { rounding: true, cut_paths: true, primitives: 1 };
+        assert!(
+            (schedule.noise_target(target) - 0.27f64.sqrt()).abs() < 1e-9 && !schedule.is_probed()
+        );
+        let pixels = 256.0;
+        let difference = |levels: f64| PairedDifference {
+            product: pixels * levels * levels,
+            product_squares: pixels * levels.powi(4),
+            ..PairedDifference::default()
+        };
+        let (rounding, cut) = (difference(0.1), difference(0.08));
+        let sums = ProbeSums { packets: 16, pixels: 256, rounding, cut, ..ProbeSums::default() };
+        let doublings = [8.0, 2.0];
+        schedule.record_probe(&ProbeSums { doublings, ..sums });
+        // The rest of the doublings, 2 (0.25 / 0.75) of 10, raises the bound to 0.08 (1 + 1 / 15).
+        let rest = 0.6 - 0.08 * 16.0 / 15.0;
+        let noise = (rest * rest - 0.01 - 0.09).sqrt();
+        assert!((schedule.noise_target(target) - noise).abs() < 1e-9 && schedule.is_probed());
+        assert!((schedule.excessive_rounding().unwrap() - 0.1).abs() < 1e-9);
+        schedule.probe.doublings = [8.0, 8.0];
+        assert_eq!(schedule.probed_parts().1, Some(f64::INFINITY));
+        assert!((schedule.noise_target(target) - 0.27f64.sqrt()).abs() < 1e-9);
     }
 }
