@@ -394,7 +394,7 @@ fn picture_stories() -> Vec<Story> {
         story("zoom out", "Z Z X", |_, d| d.model.zoom.is_some_and(|zoom| zoom.steps == 1)),
         story("zoom fits: the whole picture", "Z Alt-0", |_, d| d.model.zoom.is_none()),
         story("loupe: automatic, always, never", "G", |_, d| d.notice() == "loupe: always"),
-        story("next graphics protocol or block characters of the picture", "Alt-#", |_, d| {
+        story("next protocol or blocks of the picture", "Alt-#", |_, d| {
             d.notice() == "graphics quadrants: quadrants, as chosen"
         }),
         story("probe a pixel", "i", |_, d| {
@@ -420,7 +420,7 @@ fn picture_stories() -> Vec<Story> {
         story("flip between pinned and live", "k c", |_, d| {
             d.model.channel == DisplayChannel::Pinned
         }),
-        story("difference of pinned and live, side by side, wipe", "k C C C Left", |_, d| {
+        story("compare: difference, side by side, wipe", "k C C C Left", |_, d| {
             d.model.channel == DisplayChannel::Wipe && d.model.pictures.border < 0.0
         }),
         story("compare with an earlier picture", "k k j Down Enter", |_, d| {

@@ -260,7 +260,7 @@ pub static COMMANDS: &[Command] = &[
     command("picture", "zoom out", &[(Anywhere, "X Alt--")], |c| c.zoom(-1, None)).available(viewing),
     command("picture", "zoom fits: the whole picture", &[(Anywhere, "Alt-0")], |c| c.zoom_fits()).available(viewing),
     command("picture", "loupe: automatic, always, never", &[(Anywhere, "G")], |c| c.next_loupe()).available(viewing),
-    command("picture", "next graphics protocol or block characters of the picture", &[(Anywhere, "Alt-#")], |c| c.next_graphics()).available(viewing),
+    command("picture", "next protocol or blocks of the picture", &[(Anywhere, "Alt-#")], |c| c.next_graphics()).also("graphics kitty sixel cells quadrants sextants octants").available(viewing),
     command("picture", "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()).available(viewing).hints(&[hint(&[H::Watching], 4, "i", "probe")]),
     command("picture", "probe left", &[(Probing, "Left")], |c| c.move_probe(LEFT)).available(viewing).hints(&[hint(&[H::In(Probing)], 1, "arrows", "move")]),
     command("picture", "probe right", &[(Probing, "Right")], |c| c.move_probe(RIGHT)).available(viewing),
@@ -272,7 +272,7 @@ pub static COMMANDS: &[Command] = &[
     command("picture", "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe_by_pixel(DOWN)).available(viewing),
     command("picture", "pin this picture", &[(Anywhere, "k")], |c| c.pin()).also("compare keep").available(viewing).hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
     command("picture", "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(DisplayChannel::Pinned)).also("compare").available(viewing),
-    command("picture", "difference of pinned and live, side by side, wipe", &[(Anywhere, "C")], |c| c.next_comparison()).also("compare split").available(viewing),
+    command("picture", "compare: difference, side by side, wipe", &[(Anywhere, "C")], |c| c.next_comparison()).also("pinned live split").available(viewing),
     command("picture", "compare with an earlier picture", &[(Anywhere, "j")], |c| c.list_pictures()).also("history pinned").available(viewing),
     command("picture", "histogram or convergence", &[(Anywhere, "Alt-h")], |c| c.toggle_histogram()).also("luminance clipped levels").available(viewing),
 
