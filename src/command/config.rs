@@ -64,6 +64,11 @@ fn option<'a>(command: &'a Command, name: &str) -> Option<&'a Arg> {
     command.get_arguments().find(|arg| arg.get_long() == Some(name))
 }
 
+/// Returns the program without a subcommand, and the subcommands.
+fn commands(root: &Command) -> impl Iterator<Item = &Command> {
+    std::iter::once(root).chain(root.get_subcommands())
+}
+
 fn with_defaults(command: Command, defaults: &[(&'static str, &'static str)]) -> Command {
     defaults.iter().fold(command, |command, (name, value)| match option(&command, name) {
         Some(_) => command.mut_arg(name, |arg| arg.default_value(*value)),
@@ -143,8 +148,7 @@ fn read_option(
     let known = known.ok_or_else(|| unknown(at, "option", name, &OPTIONS))?;
     let text = item.as_str().map_or_else(|| item.to_string().trim().to_string(), str::to_string);
     let root = Cli::command();
-    let commands = std::iter::once(&root).chain(root.get_subcommands());
-    for arg in commands.filter_map(|command| option(command, name)) {
+    for arg in commands(&root).filter_map(|command| option(command, name)) {
         let arg = arg.clone().required(false);
         let alone = Command::new("zerkalo").no_binary_name(true).arg(arg);
         if let Err(error) = alone.try_get_matches_from([format!("--{name}={text}")]) {
@@ -184,14 +188,21 @@ pub fn run() -> Result<(), Failure> {
     let set = OPTIONS_SET.get().map_or(&[][..], Vec::as_slice);
     let file = path().map(|path| sanitized(&path.display().to_string())).unwrap_or_default();
     let mut text = format!("# {file}\n\n# Defaults of options, such as --threads.\n[options]\n");
+    let root = Cli::command();
+    let shipped = |name| {
+        let mut args = commands(&root).filter_map(|command| option(command, name));
+        let value = args.find_map(|arg| arg.get_default_values().first());
+        value.map_or_else(String::new, |value| format!(" {}", value.display()))
+    };
     for name in OPTIONS {
         let found = set.iter().find(|(known, _)| *known == name);
         let _ = match found {
             Some((_, value)) => writeln!(text, "{name} = {}", quoted(value)),
-            None => writeln!(text, "# {name} ="),
+            None => writeln!(text, "# {name} ={}", shipped(name)),
         };
     }
-    text += "\n# Keys of actions. Those that are not listed here have keys of their own in docs/keys.md.\n[keys]\n";
+    text +=
+        "\n# Keys of actions in their first place; docs/keys.md has the other places.\n[keys]\n";
     for command in table() {
         let (place, keys) = command.keys.first().copied().unwrap_or((KeyContext::Anywhere, ""));
         let place = if place.place().is_empty() { "" } else { &format!(" # {}", place.place()) };
