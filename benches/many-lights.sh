@@ -5,6 +5,7 @@
 #     cargo build --release
 #     benches/many-lights.sh [N...] > benches/runs/DATE-many-lights.txt
 #
+# LAMPS=1: instead, rectangle lamps in the ceiling of the box room of scenes/rectangle-light.toml.
 # Prints the processor time to a linear RMSE of 0.00068 (adaptive), and processor time times squared error of uniform
 # pictures, the mean of SEEDS runs (3), as multiples of the first N. ZERKALO names a program that has been built already.
 set -euo pipefail
@@ -16,8 +17,26 @@ work="$(mktemp -d)"
 trap 'rm -rf "$work"' EXIT
 TIMEFORMAT=%U
 
+# Prints the box room with $1 lamps in its ceiling, of the same power together.
+lamps() {
+    awk -v n="$1" '
+        /^\[\[light\]\]/ && !done {
+            done = skip = 1
+            columns = n > 1 ? int(sqrt(n - 1)) + 1 : 1
+            rows = int((n - 1) / columns) + 1
+            for (i = 0; i < n; i++)
+                printf "[[light]]\nrectangle = { center = [%.4f, 3.0, %.4f], size = [%.4f, %.4f], normal = [0.0, -1.0, 0.0] }\n" \
+                    "intensity = %.6f\nunit = \"power\"\n\n", 3.6 * (i % columns + 0.5) / columns - 1.8,
+                    3.6 * (int(i / columns) + 0.5) / rows - 1.8, 2.2 / columns, 2.2 / columns, 24.6 / n
+        }
+        /^\[materials/ { skip = 0 }
+        !skip { print }
+    ' scenes/rectangle-light.toml
+}
+
 # Prints the physical mirror room with $1 lights, in a square of rows at the height of its lamp.
 scene() {
+    [ -z "${LAMPS:-}" ] || { lamps "$1"; return; }
     awk -v n="$1" '
         /^\[\[light\]\]/ && n > 1 {
             skip = 1

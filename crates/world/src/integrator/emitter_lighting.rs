@@ -16,7 +16,7 @@ use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::{Media, attenuated};
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
-use crate::lights::emitter_choice::{Cells, MAX_WAYS};
+use crate::lights::emitter_choice::{Cells, MAX_ASKED, MAX_WAYS};
 use crate::lights::emitters::Sampled;
 use crate::world::{LightSource, World};
 use zerkalo_kernel::bvh::{Hit, Ray};
@@ -141,7 +141,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         for (index, occluders) in self.candidates.occluders.emitters.iter().enumerate() {
             let Some(source) = self.sample_emitter(index, origin) else { break };
             let rays = source.visible.then_some(&glossy);
-            self.add_emitter(&source, Sampled::One(index), rays, occluders);
+            let lanes = L::mask(true);
+            self.add_emitter(&source, Sampled::One(index), (rays, lanes), occluders);
         }
     }
 
@@ -152,31 +153,48 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let (origin, weighted) = (self.shadow_origin::<false>(), glossy.lanes.any());
         let choices = emitters.choices.iter().zip(&self.candidates.occluders.emitters);
         for (index, (choice, occluders)) in choices.enumerate() {
+            // A highlight may show any one of the emitters.
+            let few = choice.emitters().len() <= MAX_ASKED;
+            let asking = self.interaction.highlight_mask & L::mask(few);
+            let choosing = L::mask(true).and_not(asking);
+            let asked = if asking.any() { choice.emitters() } else { &[] };
+            for number in asked {
+                let number = *number as usize;
+                let Some(mut source) = self.sample_emitter(number, origin) else { break };
+                let density = source.light.density * emitters.expected(number, origin);
+                source.light.density = density.min(L::from_f64(L::MAX));
+                let rays = source.visible.then_some(glossy);
+                self.add_emitter(&source, Sampled::One(number), (rays, asking), occluders);
+            }
+            if (choosing & (self.interaction.direct_mask | glossy.lanes)).none() {
+                continue;
+            }
             let cells = choice.cells(self.interaction.ray_origin(), self.interaction.geometric);
             for way in 0..choice.ways {
                 let (source, chosen) = self.sample_chosen((index, way), &cells, (origin, weighted));
                 let lanes = glossy.lanes & source.light.density.gt(L::zero());
                 let rays = ReflectedRays { lanes, share: glossy.share };
-                self.add_emitter(&source, Sampled::Each(&chosen), Some(&rays), occluders);
+                let rays = (Some(&rays), choosing);
+                self.add_emitter(&source, Sampled::Each(&chosen), rays, occluders);
             }
         }
     }
 
-    /// Adds the light of the point `source` on the emitters `sampled`. `rays` are the reflected rays
-    /// that may hit the emitters. `occluders` are the primitives that shadow rays are tested
+    /// Adds the light of the point `source` on the emitters `sampled` to the samples in `lanes`. `rays`
+    /// are the reflected rays that may hit the emitters. `occluders` are the primitives that shadow rays are tested
     /// against.
     #[inline(always)]
     fn add_emitter(
         &mut self,
         source: &LightSource<LightSample<L>, L::Scalar>,
         sampled: Sampled<'_>,
-        rays: Option<&ReflectedRays<L>>,
+        (rays, lanes): (Option<&ReflectedRays<L>>, L::Mask),
         occluders: &PrimitiveSet,
     ) {
         self.out.counts.glossy = true;
         let world = self.world;
         let (origin, light) = (self.shadow_origin::<false>(), &source.light);
-        let arrives = light.irradiance.max_element().gt(L::zero());
+        let arrives = lanes & light.irradiance.max_element().gt(L::zero());
         let arrives = arrives & self.arrives(light.wi);
         let value = self.reflected(light, arrives, rays, |_| L::one());
         let lit = value.max_element().gt(L::zero());

@@ -27,7 +27,11 @@ use zerkalo_scene::value::sort_by_number;
 pub(crate) const MIN_EMITTERS: usize = 16;
 
 /// Largest number of choices at a surface from the emitters of a light group.
-pub(crate) const MAX_WAYS: usize = 4;
+pub(crate) const MAX_WAYS: usize = 2;
+
+/// Largest number of emitters of a light group that are all asked at highlights, whose light most of
+/// them do not add to: 512 lamps cost a few times as much as if some are chosen, to equal error less.
+pub(crate) const MAX_ASKED: usize = 1024;
 
 /// Largest number of clusters in a cell.
 const MAX_CLUSTERS: usize = 128;
@@ -36,7 +40,7 @@ const MAX_CLUSTERS: usize = 128;
 const SLOTS_PER_CLUSTER: usize = 4;
 
 /// Largest number of cells.
-const MAX_CELLS: usize = 512;
+const MAX_CELLS: usize = 128;
 
 /// Square of the smallest distance at which importance still grows, relative to the radii of cell
 /// and cluster. The mean of 1 / distance^2 over a cube is that at this fraction of the radius of the
@@ -202,8 +206,13 @@ impl<S: Float> EmitterChoice<S> {
             let width = ball.radius / (ball.radius + ball.center.distance(cell.ball.center));
             ((of.importance(cell) * width).to_bits(), node)
         };
+        let is_leaf = |node: &u32| self.nodes[*node as usize].children.is_none();
         let mut cut: Vec<u32> = Vec::with_capacity(self.clusters_per_cell);
-        let mut heap = BinaryHeap::from([entry(0)]);
+        let mut heap = BinaryHeap::new();
+        match self.clusters_per_cell == self.emitters.len() {
+            true => cut.extend((0..self.nodes.len() as u32).filter(is_leaf)),
+            false => heap.push(entry(0)),
+        }
         while let Some((_, node)) = heap.pop() {
             match self.nodes[node as usize].children {
                 Some(child) if cut.len() + heap.len() + 2 <= self.clusters_per_cell => {
