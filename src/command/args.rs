@@ -4,6 +4,7 @@ use crate::dashboard::run::{Colors, TerminalSetup};
 use crate::measure::{EXPERIMENTS, Experiment};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
 use std::path::{Path, PathBuf};
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::film::{Display, Tone};
@@ -143,6 +144,13 @@ pub enum Command {
     /// Report the capabilities of the terminal and of the connection, and how to improve them
     #[command(after_help = include_str!("help/doctor.txt").trim_end())]
     Doctor(JsonArgs),
+    /// Print the completions of a shell
+    Completions { shell: Shell },
+    /// Write the manual pages of all commands
+    Man {
+        /// The folder to write them to
+        folder: PathBuf,
+    },
 }
 
 /// Arguments of `zerkalo render`.
