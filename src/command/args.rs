@@ -4,6 +4,7 @@ use crate::dashboard::run::{Colors, TerminalSetup};
 use crate::measure::{EXPERIMENTS, Experiment};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
 use std::path::{Path, PathBuf};
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::film::Display;
@@ -147,6 +148,13 @@ pub enum Command {
     Doctor(JsonArgs),
     /// Print options, keys and colours in force, as a configuration file
     Config,
+    /// Print the completions of a shell
+    Completions { shell: Shell },
+    /// Write the manual pages of all commands
+    Man {
+        /// The folder to write them to
+        folder: PathBuf,
+    },
 }
 
 /// Arguments of `zerkalo render`.

@@ -14,6 +14,7 @@ mod load_progress;
 mod measure;
 mod merge;
 mod new;
+mod package_files;
 mod part_file;
 mod plan;
 mod progress;
@@ -100,6 +101,8 @@ pub fn main() -> ExitCode {
         Some(Command::New { file }) => new::run(file),
         Some(Command::Doctor(args)) => doctor::run(*args),
         Some(Command::Config) => config::run(),
+        Some(Command::Completions { shell }) => package_files::print_completions(*shell),
+        Some(Command::Man { folder }) => package_files::write_manual(folder),
         None => edit::run(&cli.edit),
     };
     let (status, message) = match result {
@@ -217,10 +220,14 @@ fn print_json(results: &impl Serialize) -> Result<(), Failure> {
     write_line(io::stdout().lock(), &text.chars().map(escaped).collect::<String>())
 }
 
-/// Writes a line to `out`. A closed pipe, as after `| head`, is not an error.
+/// Writes a line to `out`.
 fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
-    let printed = writeln!(out, "{}", sanitized_lines(message)).and_then(|()| out.flush());
-    match printed {
+    checked_stdout(writeln!(out, "{}", sanitized_lines(message)).and_then(|()| out.flush()))
+}
+
+/// Converts the result of writing to stdout. A closed pipe, as after `| head`, is not an error.
+fn checked_stdout(written: io::Result<()>) -> Result<(), Failure> {
+    match written {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Failure::Failed(format!("cannot write to stdout: {error}")))
         }

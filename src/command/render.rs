@@ -6,12 +6,12 @@ use crate::command::deadline::Deadline;
 use crate::command::progress::{Progress, counts, noise};
 use crate::command::regions::Division;
 use crate::command::{
-    Failure, STREAM, handle_signals, print_error, print_line, read_scene, save, shard, stats, warn,
-    warn_of_precision,
+    Failure, STREAM, checked_stdout, handle_signals, print_error, print_line, read_scene, save,
+    shard, stats, warn, warn_of_precision,
 };
 use std::fmt::Display;
 use std::fs::File;
-use std::io::{self, ErrorKind, IsTerminal};
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -122,22 +122,15 @@ impl Target {
     }
 
     /// Copies the picture to stdout and prints `summary`: on stdout if the picture is in a file.
-    /// A reader that closes the pipe early is not an error.
     fn deliver(&self, summary: &str) -> Result<(), Failure> {
         if self.temporary.is_none() {
             return print_line(summary);
         }
         let copied = File::open(&self.output.path)
             .and_then(|mut picture| io::copy(&mut picture, &mut io::stdout()));
-        match copied {
-            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-                Err(Failure::Failed(format!("cannot write to stdout: {error}")))
-            }
-            _ => {
-                warn(summary);
-                Ok(())
-            }
-        }
+        checked_stdout(copied.map(drop))?;
+        warn(summary);
+        Ok(())
     }
 }
 

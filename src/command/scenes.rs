@@ -1,9 +1,9 @@
 //! `zerkalo scenes`: lists, prints and copies built-in scenes. Their names on the command line.
 
 use crate::command::args::ScenesArgs;
-use crate::command::{Failure, print_line};
+use crate::command::{Failure, checked_stdout, print_line};
 use crate::dashboard::scene_source::{BUILT_IN, SceneSource};
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, Write};
 use std::path::Path;
 use zerkalo_scene::disk::{Existing, replace_file};
 
@@ -15,12 +15,7 @@ pub fn run(args: &ScenesArgs) -> Result<(), Failure> {
     };
     let (name, text) = BUILT_IN[by_part_of_name(name.trim_start_matches(':'))?];
     let Some(file) = &args.file else {
-        return match io::stdout().write_all(text.as_bytes()) {
-            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-                Err(Failure::Failed(format!("cannot write to stdout: {error}")))
-            }
-            _ => Ok(()),
-        };
+        return checked_stdout(io::stdout().write_all(text.as_bytes()));
     };
     replace_file(file, Existing::Refuse, |file| file.write_all(text.as_bytes()))?;
     let file = file.display();

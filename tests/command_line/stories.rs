@@ -111,6 +111,14 @@ const STORIES: &[Story] = &[
         "",
         "its colour is emission_color",
     ),
+    // Files of packages.
+    ("zerkalo completions zsh | head -n 1", 0, "#compdef zerkalo", ""),
+    (
+        "zerkalo man pages && ls pages",
+        0,
+        "zerkalo-render.1\nzerkalo-scenes.1\nzerkalo-watch.1\nzerkalo.1\n",
+        "",
+    ),
     // No terminal, help, signals, deadline.
     ("zerkalo scene.toml", 2, "", "the dashboard needs a terminal"),
     ("zerkalo new new.toml", 0, "`zerkalo new.toml` opens it in the dashboard", ""),
