@@ -258,10 +258,15 @@ impl Schedule {
     fn next_round(&mut self) -> Vec<Job> {
         let original = self.settings.stop.spp.map(|_| self.clone());
         let rest = self.rest_of_interrupted();
+        let estimated_at = self.estimated_at;
         let whole = if rest.is_empty() { self.planned(None) } else { rest.clone() };
         let Some(original) = original else { return whole };
         let before = self.clone();
-        let mut round = if rest.is_empty() { self.planned(self.settings.stop.spp) } else { rest };
+        let mut round = rest;
+        if round.is_empty() {
+            self.estimated_at = estimated_at;
+            round = self.planned(self.settings.stop.spp);
+        }
         let mut left = self.samples_left();
         // In a uniform picture, no tile has more samples than the mean.
         let most = if self.settings.adaptive { None } else { self.settings.stop.spp };
