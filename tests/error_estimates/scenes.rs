@@ -6,7 +6,11 @@ use crate::harness::*;
 
 /// Names of the kinds of generated scenes.
 pub const KINDS: &str = "one ball|balls of a pixel|stars|hairlines|far checkerboard|distant crowd|\
-     crowd with mirrors|closed glossy room|mirror room|glass";
+     crowd with mirrors|closed glossy room|mirror room|glass|caustics|bounces|rough glass|lamps out of focus|\
+     environment with a sun";
+/// Number of scenes of the first ten kinds, ten of which follow each other. Scenes beyond are of the
+/// other five.
+const FIRST_KINDS: u64 = 200;
 
 /// Generated scene with its name.
 pub struct Sample {
@@ -29,7 +33,7 @@ fn random_color(n: &mut Numbers) -> String {
 const HALF_HEIGHT: f64 = 3.64;
 
 pub fn scene(seed: u64) -> Sample {
-    let kind = (seed % 10) as usize;
+    let kind = if seed < FIRST_KINDS { seed % 10 } else { 10 + seed % 5 } as usize;
     let mut n = Numbers::new(seed.wrapping_mul(0x9e37_79b9) ^ 0x5eed);
     let size = [[160, 120], [160, 128], [200, 100], [240, 180]][whole(&mut n, 0, 3) as usize];
     let name = format!("{seed} {}", KINDS.split('|').nth(kind).unwrap());
@@ -58,6 +62,16 @@ pub fn scene(seed: u64) -> Sample {
             let mirror = scene.materials.get_mut("mirror").unwrap();
             mirror.roughness = n.log_uniform(0.003, 0.5);
             scene.camera.eye[0] += n.between(-1.0, 1.0);
+            scene
+        }
+        10..=12 => lit_ball(&mut n, size, kind),
+        13 => out_of_focus(&mut n, size),
+        14 => {
+            let mut scene = sized(shipped("environment-image.toml"), size);
+            for material in scene.materials.values_mut().filter(|m| m.roughness > 0.0) {
+                material.roughness = n.log_uniform(0.02, 0.6);
+            }
+            scene.camera.eye[0] += n.between(-2.0, 2.0);
             scene
         }
         _ => {
@@ -186,6 +200,60 @@ fn room(n: &mut Numbers, size: [u32; 2]) -> Scene {
         write!(
             text,
             "[[object]]\nmaterial = \"ball\"\nshape.sphere = {{ center = [{x}, {y}, {z}], radius = {radius} }}\n"
+        )
+        .unwrap();
+    }
+    parsed(&text)
+}
+
+/// Returns the scene of a ball under a small lamp: clear glass with caustics on the floor (kind 10),
+/// matte in a closed room with diffuse bounces (11), or rough glass (12).
+fn lit_ball(n: &mut Numbers, size: [u32; 2], kind: usize) -> Scene {
+    let eye = if kind == 11 { "2.5]\ntarget" } else { "8.0]\ntarget" };
+    let mut text = head(size, "[0.02, 0.02, 0.03]", 0.0).replace("10.0]\ntarget", eye);
+    let glass = "diffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\nior = 1.5\nfresnel = \"dielectric\"\n";
+    let (trace, ball) = match kind {
+        10 => ("max_diffuse_depth = 1\ncaustics = true\n".to_string(), glass.to_string()),
+        11 => (
+            format!("max_diffuse_depth = {}\n", whole(n, 1, 3)),
+            "color = [0.8, 0.7, 0.6]\n".into(),
+        ),
+        _ => {
+            let roughness = n.log_uniform(0.01, 0.5);
+            (String::new(), format!("{glass}lobe = \"ggx\"\nroughness = {roughness}\n"))
+        }
+    };
+    let (x, lamp, intensity) =
+        (n.between(-1.5, 1.5), n.log_uniform(0.02, 0.4), n.log_uniform(3.0, 60.0));
+    let (radius, color) = (n.between(0.4, 1.2), random_color(n));
+    write!(
+        text,
+        "[trace]\n{trace}[[light]]\nsphere = {{ center = [{x}, 2.2, -1.0], radius = {lamp} }}\n\
+         intensity = {intensity}\n\
+         [materials.wall]\ncolor = {color}\n[materials.ball]\n{ball}\
+         [[object]]\nmaterial = \"wall\"\n\
+         shape.box = {{ center = [0.0, 0.0, 0.0], size = [6.0, 5.0, 18.0] }}\n\
+         [[object]]\nmaterial = \"ball\"\n\
+         shape.sphere = {{ center = [0.0, -0.6, -1.0], radius = {radius} }}\n"
+    )
+    .unwrap();
+    parsed(&text)
+}
+
+/// Returns the scene of bright balls before and behind the plane of focus.
+fn out_of_focus(n: &mut Numbers, size: [u32; 2]) -> Scene {
+    let (aperture, emission) = (n.log_uniform(0.03, 1.0), n.log_uniform(2.0, 300.0));
+    let lens =
+        format!("view_angle.vertical = 40.0\naperture.radius = {aperture}\nfocus.distance = 8.0");
+    let mut text =
+        head(size, "[0.01, 0.01, 0.02]", 0.0).replace("view_angle.vertical = 40.0", &lens);
+    write!(text, "[materials.m]\ndiffuse = 0.0\nambient = 0.0\nemission = {emission}\n").unwrap();
+    for _ in 0..whole(n, 5, 60) {
+        let (x, y, z) = (n.between(-4.0, 4.0), n.between(-3.0, 3.0), n.between(-15.0, 4.0));
+        let radius = n.log_uniform(0.01, 0.1);
+        write!(
+            text,
+            "[[object]]\nmaterial = \"m\"\nshape.sphere = {{ center = [{x}, {y}, {z}], radius = {radius} }}\n"
         )
         .unwrap();
     }

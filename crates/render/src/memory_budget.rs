@@ -3,7 +3,7 @@
 //! A failed allocation ends the program; the picture and the edits made in the dashboard are then
 //! lost. The needed memory is therefore compared with every known limit before a film is created.
 
-use crate::film::{Film, TILE, TileNoise};
+use crate::film::{Film, TILE};
 use zerkalo_scene::process_memory::{
     Available, ResidentMemory, available_memory, megabytes, resident_memory,
 };
@@ -63,10 +63,10 @@ pub fn refused(size: [u32; 2], groups: usize) -> String {
 
 /// Memory \[bytes\] of a tile while its region is rendered, in addition to its sums: its entry in
 /// the schedule, its estimates, jobs and reports.
-const REGION_TILE_BYTES: u64 = 1024;
-/// Memory \[bytes\] for each tile of the whole picture, while regions are rendered: its estimate,
-/// and its entry in the list for percentiles.
-const PICTURE_TILE_BYTES: u64 = (size_of::<Option<TileNoise>>() + size_of::<f64>()) as u64;
+const REGION_TILE_BYTES: u64 = 2048;
+/// Memory \[bytes\] for each tile of the whole picture, while regions are rendered: its entry in the
+/// list for percentiles, which doubles when it is full.
+const PICTURE_TILE_BYTES: u64 = 3 * size_of::<f64>() as u64;
 /// Memory \[bytes per pixel column and layer\] while a row of OpenEXR tiles is encoded. The layers
 /// are the picture, its two replicates, and the light groups.
 const ROW_BYTES: u64 = 256;
@@ -171,7 +171,7 @@ mod tests {
             assert_eq!(16384u32.div_ceil(regions.rows), regions.count, "{regions:?}");
             // One region fewer would not fit.
             let rows = 16384u32.div_ceil(regions.count.max(2) - 1).next_multiple_of(16);
-            let band = Film::memory_bytes([16384, rows], 1) + 1024 * 1024 * u64::from(rows / 16);
+            let band = Film::memory_bytes([16384, rows], 1) + 2048 * 1024 * u64::from(rows / 16);
             assert!(regions.count == 1 || resident.now + band > cap - 200_000_000, "{regions:?}");
         }
         // The last region may be smaller, and no region is empty.

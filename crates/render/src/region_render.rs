@@ -7,7 +7,7 @@
 
 use crate::export::{Provenance, film_header, metadata};
 use crate::film::file::FilmFileHeader;
-use crate::film::{Film, Header, Noise, TileNoise};
+use crate::film::{Film, Header, NoiseSums};
 use crate::image_file::{Bands, Depth, ImageOutput};
 use crate::schedule::{Interval, SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, StoppedBy};
 use crate::session::{Report, State};
@@ -40,8 +40,8 @@ pub struct RegionRender {
     /// Number of rows of each region except the last, which may have fewer.
     rows: u32,
     finished_rows: u32,
-    /// Estimated errors of the tiles of the finished regions, in row order.
-    estimates: Vec<Option<TileNoise>>,
+    /// Estimated errors of the tiles of the finished regions.
+    estimates: NoiseSums,
     report: Report,
     stopped_by: StoppedBy,
 }
@@ -76,7 +76,7 @@ impl RegionRender {
             pool,
             rows,
             finished_rows: 0,
-            estimates: Vec::new(),
+            estimates: NoiseSums::default(),
             report,
             stopped_by: StoppedBy::Full,
         })
@@ -146,14 +146,14 @@ impl RegionRender {
             observer(&self.report_with(&state, &schedule, seconds, schedule.progress(seconds)))?;
         };
         self.report = self.report_with(&state, &schedule, seconds, Some(1.0));
-        self.estimates.extend(schedule.tile_estimates());
+        schedule.tile_estimates().for_each(|tile| self.estimates.add(tile));
         self.state = Some(state);
         self.finished_rows = rows.end;
         if self.stopped_by != StoppedBy::Time {
             self.stopped_by = reason;
         }
         if rows.end == height {
-            self.report.noise = Noise::of_tiles(self.estimates.iter().copied());
+            self.report.noise = std::mem::take(&mut self.estimates).noise();
             if let (Some(error), Some(noise)) = (&mut self.report.error, self.report.noise) {
                 error.noise = noise.rmse.levels;
             }

@@ -13,6 +13,13 @@ pub struct Job {
     pub count: u32,
 }
 
+impl Job {
+    /// Returns the index after the last sample.
+    pub fn end(&self) -> u32 {
+        self.first + self.count
+    }
+}
+
 /// Jobs that are traced concurrently, at most one for each tile. All jobs of a wave end before the
 /// next wave starts.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -32,6 +32,7 @@ pub use display::{Display, quantised_16};
 pub use downsample::{IncrementalDownsample, Thumbnail};
 pub use light_weights::{LightWeights, Replicates, Sums};
 pub use linear_image::LinearImage;
+pub(crate) use noise::NoiseSums;
 pub use noise::{ByMeasure, Estimator, Noise, TileNoise};
 pub use pixel_probe::PixelProbe;
 pub use srgb_table::quantised_8;

@@ -43,6 +43,7 @@ use crate::film::light_weights::LightWeights;
 use crate::film::srgb_table::{SRGB_TABLE, SrgbTable};
 use crate::film::tile::Tile;
 use crate::film::{Captures, Stratum, TILE, TILE_PIXELS};
+use std::collections::BTreeMap;
 use zerkalo_scene::Tone;
 
 /// Pair of numbers, one for each of the two measures of error.
@@ -271,38 +272,65 @@ impl Noise {
     /// Combines the estimates of all tiles. Returns `None` if there are no tiles or an estimate is
     /// missing.
     pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
-        let (mut reported, mut all, mut pixels) = (ByMeasure::default(), ByMeasure::default(), 0.0);
-        let mut squares = ByMeasure::default();
-        let tiles: Vec<TileNoise> = tiles.into_iter().collect::<Option<_>>()?;
-        let mut tile_errors = Vec::new();
-        let mut samples: Option<u32> = None;
-        let mut is_uniform = true;
-        for tile in &tiles {
-            is_uniform &= *samples.get_or_insert(tile.samples) == tile.samples;
-            let weight = f64::from(tile.pixels);
-            reported.add(weight, tile.reported);
-            all.add(weight, tile.of_all());
-            squares.add(1.0, tile.squares);
-            pixels += weight;
-            tile_errors.push(tile.of_all().levels);
-        }
+        let mut sums = NoiseSums::default();
+        tiles.into_iter().for_each(|tile| sums.add(tile));
+        sums.noise()
+    }
+}
+
+/// Sums of the estimates of tiles.
+#[derive(Default)]
+pub(crate) struct NoiseSums {
+    reported: ByMeasure,
+    all: ByMeasure,
+    squares: ByMeasure,
+    pixels: f64,
+    /// Mean square error of each tile, in squared 8-bit levels.
+    tile_errors: Vec<f64>,
+    /// Least and largest number of samples per pixel.
+    samples: Option<[u32; 2]>,
+    strata: BTreeMap<u32, Stratum>,
+    /// `true` if a tile has no estimate.
+    incomplete: bool,
+}
+
+impl NoiseSums {
+    pub fn add(&mut self, tile: Option<TileNoise>) {
+        let Some(tile) = tile else {
+            self.incomplete = true;
+            return;
+        };
+        let weight = f64::from(tile.pixels);
+        self.reported.add(weight, tile.reported);
+        self.all.add(weight, tile.of_all());
+        self.squares.add(1.0, tile.squares);
+        self.pixels += weight;
+        self.tile_errors.push(tile.of_all().levels);
+        let [least, most] = self.samples.unwrap_or([tile.samples; 2]);
+        self.samples = Some([least.min(tile.samples), most.max(tile.samples)]);
+        self.strata.entry(tile.samples.ilog2()).or_default().add(&tile);
+    }
+
+    /// Returns the estimate of the picture; `None` if there are no tiles or an estimate is missing.
+    pub fn noise(mut self) -> Option<Noise> {
+        let [least, most] = self.samples.filter(|_| !self.incomplete)?;
         // Smallest value that at least 95 % of the tiles do not exceed.
-        let rank = (tile_errors.len() * 19).div_ceil(20).checked_sub(1)?;
-        let (_, p95, _) = tile_errors.select_nth_unstable_by(rank, f64::total_cmp);
+        let rank = (self.tile_errors.len() * 19).div_ceil(20).checked_sub(1)?;
+        let (_, p95, _) = self.tile_errors.select_nth_unstable_by(rank, f64::total_cmp);
         let p95_levels = p95.sqrt();
         // `sum` adds means over three channels; `squares` adds squares of sums over channels.
-        let effective_pixels = all.zip(squares, |sum, squares| {
+        let effective_pixels = self.all.zip(self.squares, |sum, squares| {
             let sum = 3.0 * sum;
             if squares > 0.0 { sum * sum / squares } else { 0.0 }
         });
-        for stratum in Stratum::of_tiles(tiles.iter()).values() {
-            reported.levels += stratum.pixels * stratum.missing_of_half(1);
-            all.levels += stratum.pixels * stratum.missing();
+        for stratum in self.strata.values() {
+            self.reported.levels += stratum.pixels * stratum.missing_of_half(1);
+            self.all.levels += stratum.pixels * stratum.missing();
         }
-        let rmse = reported.zip(all, |white, all| {
-            let sum = if is_uniform { all } else { white.max(all) };
-            (sum / pixels).sqrt()
+        let rmse = self.reported.zip(self.all, |white, all| {
+            let sum = if least == most { all } else { white.max(all) };
+            (sum / self.pixels).sqrt()
         });
-        Some(Self { rmse, p95_levels, effective_pixels })
+        Some(Noise { rmse, p95_levels, effective_pixels })
     }
 }

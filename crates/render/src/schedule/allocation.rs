@@ -116,13 +116,13 @@ pub(super) struct Allocation<'a> {
 }
 
 impl<'a> Allocation<'a> {
-    pub fn new(schedule: &'a Schedule) -> Self {
+    pub fn new(schedule: &'a Schedule, samples_left: u64) -> Self {
         Self {
             schedule,
             counts: schedule.tiles.iter().map(|t| t.done).collect(),
             spent: 0.0,
             blocks: 0,
-            samples_left: schedule.samples_left(),
+            samples_left,
         }
     }
 
@@ -175,14 +175,14 @@ impl<'a> Allocation<'a> {
 
 impl Schedule {
     /// Returns the jobs of the next round of the adaptive phase, which starts when every tile has
-    /// [`Schedule::min_samples`].
-    pub(super) fn highest_gain(&self) -> Vec<Job> {
+    /// [`Schedule::min_samples`]. `spp` is as in [`Schedule::planned`].
+    pub(super) fn highest_gain(&self, spp: Option<u32>) -> Vec<Job> {
         let criterion = self.settings.criterion;
         let pooled = [false, true].map(|glossy| self.fitted_slope(glossy).unwrap_or(FLATTEST));
         let models = self.tile_models(pooled);
         let expected = self.calibrated(&models);
 
-        let mut allocation = Allocation::new(self);
+        let mut allocation = Allocation::new(self, self.samples_to(spp));
         let budget = ROUND_SHARE * self.rays as f64;
         allocation.explore(EXPLORATION * budget);
 

@@ -93,6 +93,8 @@ pub struct Schedule {
     pub noise: Option<Noise>,
     /// Samples per pixel and replicate after the latest uniform round that ended with an estimate.
     estimated_at: u32,
+    /// State of the render without [`Stop::spp`], which has cut off its current round.
+    interrupted: Option<Box<Schedule>>,
     /// Light period: the number of samples of a pixel that together trace a shadow ray to each
     /// light once; see [`WorldInfo::light_period`](zerkalo_world::WorldInfo::light_period).
     ///
@@ -181,6 +183,7 @@ impl Schedule {
         self.tiles.iter_mut().for_each(Tile::forget_estimates);
         self.noise = None;
         (self.probe, self.probed_at) = Default::default();
+        self.interrupted = None;
         self.convergence = ConvergenceFit::default();
     }
 
@@ -190,6 +193,7 @@ impl Schedule {
         for (tile, estimate) in self.tiles.iter_mut().zip(estimates) {
             tile.set_estimate(*estimate);
         }
+        self.interrupted = None;
         // The current round may have begun before the first estimates, without `estimate`.
         self.estimate |= self.tiles.iter().all(|t| t.error.is_some());
         self.update_noise();
@@ -248,19 +252,93 @@ impl Schedule {
     /// Returns the number of samples per replicate, over all pixels, that are missing to the
     /// requested mean number of samples per pixel; `u64::MAX` if none is requested.
     fn samples_left(&self) -> u64 {
-        let Some(spp) = self.settings.stop.spp else { return u64::MAX };
+        self.samples_to(self.settings.stop.spp)
+    }
+
+    fn samples_to(&self, spp: Option<u32>) -> u64 {
+        let Some(spp) = spp else { return u64::MAX };
         (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(self.done())
     }
 
     /// Returns the jobs of the next round, and stores in `estimate` if the round ends with noise
     /// estimates. Returns no jobs if nothing is left to trace.
+    ///
+    /// The round is that of a render without [`Stop::spp`]. If this criterion cuts it off, the state
+    /// of that render is kept, and a resumed render continues from it.
     fn next_round(&mut self) -> Vec<Job> {
+        let original = self.settings.stop.spp.map(|_| self.clone());
+        let rest = self.rest_of_interrupted();
+        let estimated_at = self.estimated_at;
+        let whole = if rest.is_empty() { self.planned(None) } else { rest.clone() };
+        let Some(original) = original else { return whole };
+        let before = self.clone();
+        let mut round = rest;
+        if round.is_empty() {
+            self.estimated_at = estimated_at;
+            round = self.planned(self.settings.stop.spp);
+        }
+        let mut left = self.samples_left();
+        // In a uniform picture, no tile has more samples than the mean.
+        let most = if self.settings.adaptive { None } else { self.settings.stop.spp };
+        let most = most.map_or(MAX_SAMPLES, |spp| spp.div_ceil(2));
+        let mut ends: Vec<u32> = self.tiles.iter().map(|tile| tile.done).collect();
+        whole.iter().for_each(|job| ends[job.tile as usize] = job.end());
+        for job in &mut round {
+            let tile = job.tile as usize;
+            let pixels = u64::from(self.tiles[tile].pixels);
+            let affordable = u32::try_from(left / pixels).unwrap_or(MAX_SAMPLES);
+            let end = ends[tile].min(most);
+            job.count = job.count.min(end.saturating_sub(job.first)).min(affordable);
+            left -= u64::from(job.count) * pixels;
+        }
+        round.retain(|job| job.count > 0);
+        self.estimate |= round != whole || left == 0;
+        if round.is_empty() {
+            *self = original;
+        } else if round != whole || self.estimate != before.estimate {
+            self.interrupted = Some(Box::new(Self { round: whole, ..before }));
+        }
+        round
+    }
+
+    /// Replaces the state that [`Stop::spp`] has ended inside a round by that of the render without
+    /// this criterion. Returns the jobs that are left of the round; none if other settings have
+    /// changed.
+    fn rest_of_interrupted(&mut self) -> Vec<Job> {
+        let settings = self.settings;
+        let continues = |whole: &Box<Self>| {
+            let stop = Stop { spp: settings.stop.spp, ..whole.settings.stop };
+            Settings { stop, ..whole.settings } == settings
+        };
+        let Some(whole) = self.interrupted.take().filter(continues) else { return Vec::new() };
+        let ended = std::mem::replace(self, Self { settings, ..*whole });
+        (self.samples, self.rays) = (ended.samples, ended.rays);
+        let mut ends: Vec<u32> = ended.tiles.iter().map(|tile| tile.done).collect();
+        for job in std::mem::take(&mut self.round) {
+            let (tile, ended) = (job.tile as usize, &ended.tiles[job.tile as usize]);
+            ends[tile] = job.end();
+            let error = ended.error.filter(|_| self.estimate && ended.done == job.end());
+            let rays = ended.rays.saturating_sub(self.tiles[tile].rays);
+            self.tiles[tile].done = ended.done;
+            let report = JobReport { rays, glossy: ended.glossy, error };
+            self.tiles[tile].record(&report, self.light_period);
+        }
+        let rest = self.jobs_to(ends.into_iter());
+        if rest.is_empty() && self.estimate {
+            self.update_noise();
+        }
+        rest
+    }
+
+    /// Returns the jobs of the next round of a render to a mean number of samples per pixel `spp`,
+    /// if there is one.
+    fn planned(&mut self, spp: Option<u32>) -> Vec<Job> {
         self.estimate = true;
         let common = self.common_count();
         if common < self.min_samples() || !self.settings.adaptive {
-            self.uniform(common)
+            self.uniform(common, spp)
         } else {
-            self.highest_gain()
+            self.highest_gain(spp)
         }
     }
 
@@ -278,7 +356,7 @@ impl Schedule {
 
     /// Returns jobs that raise all tiles to the same number of samples, or to their caps. `common`
     /// is the result of [`Schedule::common_count`].
-    fn uniform(&mut self, common: u32) -> Vec<Job> {
+    fn uniform(&mut self, common: u32, spp: Option<u32>) -> Vec<Job> {
         let grown = match common {
             // The count is between two powers of two if an earlier stop criterion has ended the
             // render there.
@@ -288,8 +366,7 @@ impl Schedule {
                     + to_packet(n)
             }
         };
-        let limit =
-            self.settings.stop.spp.map_or(MAX_SAMPLES, |spp| spp.div_ceil(2)).min(MAX_SAMPLES);
+        let limit = spp.map_or(MAX_SAMPLES, |spp| spp.div_ceil(2)).min(MAX_SAMPLES);
         let count = grown.min(limit.saturating_sub(common));
         let after = common + count;
         let last = after == limit;

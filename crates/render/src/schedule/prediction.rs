@@ -72,7 +72,7 @@ impl Schedule {
         let slopes = [false, true]
             .map(|glossy| self.fitted_slope(glossy).unwrap_or(usual_slopes[usize::from(glossy)]));
         let expected = self.calibrated(&self.tile_models(slopes));
-        let mut allocation = Allocation::new(self);
+        let mut allocation = Allocation::new(self, self.samples_left());
         let slope = self.convergence.fitted_slope().unwrap_or(0.5 * (slopes[0] + slopes[1]));
         let growth = (rmse / target).max(1.0).powf(1.0 / slope);
         allocation.explore(EXPLORATION * self.rays as f64 * (growth - 1.0));

@@ -9,7 +9,8 @@
 //!   (u8);
 //! - the noise of the picture, the sums of the error probes with the number of samples at the
 //!   latest one, and the points of the convergence fit;
-//! - the jobs of the current round, its jobs that remain to be traced, and the tiles.
+//! - the jobs of the current round, its jobs that remain to be traced, and the tiles;
+//! - an option of the same parts for the render whose round a stop criterion has cut off.
 
 use crate::error_probe::{PairedDifference, ProbeSums};
 use crate::film::file::Fields;
@@ -53,6 +54,8 @@ impl Schedule {
             out.push(tile.history.len() as u8);
             tile.history.iter().for_each(|estimate| encode_estimate(estimate, &mut out));
         }
+        out.push(u8::from(self.interrupted.is_some()));
+        self.interrupted.iter().for_each(|whole| out.extend(whole.encode()));
         out
     }
 
@@ -62,31 +65,12 @@ impl Schedule {
     /// schedule may then have changed.
     pub fn restore(&mut self, state: &[u8], counts: &[[u32; 2]]) -> Option<()> {
         let mut fields = Fields::new(state);
-        let criterion = if flag(&mut fields)? { Criterion::Linear } else { Criterion::Levels };
-        (self.samples, self.rays) = (fields.u64()?, fields.u64()?);
-        self.estimated_at = fields.u32()?;
-        self.estimate = flag(&mut fields)?;
-        self.replicate = usize::from(flag(&mut fields)?);
-        if flag(&mut fields)? {
-            self.noise = Some(Noise {
-                rmse: decode_by_measure(&mut fields)?,
-                p95_levels: error(&mut fields)?,
-                effective_pixels: decode_by_measure(&mut fields)?,
-            });
-        }
-        (self.probe, self.probed_at) = (decode_probe(&mut fields)?, fields.u64()?);
-        let points = fields.u32()?;
-        let point = |_| Some((error(&mut fields)?, error(&mut fields)?));
-        self.convergence.points = (0..points).map(point).collect::<Option<_>>()?;
-        self.round = self.decode_jobs(&mut fields)?;
-        self.remaining = self.decode_jobs(&mut fields)?;
-        if fields.u32()? as usize != self.tiles.len() || counts.len() != self.tiles.len() {
+        let criterion = self.decode(&mut fields, true)?;
+        if counts.len() != self.tiles.len() {
             return None;
         }
-        for (tile, counts) in self.tiles.iter_mut().zip(counts) {
-            decode_tile(tile, &mut fields)?;
-            let [a, b] = *counts;
-            if tile.done != b || a < b || a > MAX_SAMPLES {
+        for (tile, [a, b]) in self.tiles.iter().zip(counts) {
+            if tile.done != *b || a < b || *a > MAX_SAMPLES {
                 return None;
             }
         }
@@ -98,6 +82,45 @@ impl Schedule {
             self.forget_estimates();
         }
         Some(())
+    }
+
+    /// Decodes a state into a new schedule of the same film. If `cut` is `false`, its round must not
+    /// be cut off. Returns the criterion.
+    fn decode(&mut self, fields: &mut Fields, cut: bool) -> Option<Criterion> {
+        let new = self.clone();
+        let criterion = if flag(fields)? { Criterion::Linear } else { Criterion::Levels };
+        (self.samples, self.rays) = (fields.u64()?, fields.u64()?);
+        self.estimated_at = fields.u32()?;
+        self.estimate = flag(fields)?;
+        self.replicate = usize::from(flag(fields)?);
+        if flag(fields)? {
+            self.noise = Some(Noise {
+                rmse: decode_by_measure(fields)?,
+                p95_levels: error(fields)?,
+                effective_pixels: decode_by_measure(fields)?,
+            });
+        }
+        (self.probe, self.probed_at) = (decode_probe(fields)?, fields.u64()?);
+        let points = fields.u32()?;
+        let point = |_| Some((error(fields)?, error(fields)?));
+        self.convergence.points = (0..points).map(point).collect::<Option<_>>()?;
+        self.round = self.decode_jobs(fields)?;
+        self.remaining = self.decode_jobs(fields)?;
+        if fields.u32()? as usize != self.tiles.len() {
+            return None;
+        }
+        for tile in &mut self.tiles {
+            decode_tile(tile, fields)?;
+        }
+        if flag(fields)? {
+            let mut whole = new;
+            if !cut {
+                return None;
+            }
+            whole.decode(fields, false)?;
+            self.interrupted = Some(Box::new(whole));
+        }
+        Some(criterion)
     }
 
     /// Decodes a list of jobs with different tiles.

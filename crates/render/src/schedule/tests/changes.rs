@@ -127,3 +127,34 @@ fn cap_may_rise_and_fall() {
     assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
     assert_eq!((schedule.spp().min, schedule.spp().max), (100, 100));
 }
+
+/// Checks that a render to a mean number of samples, which is saved and resumed to more samples,
+/// gives every tile as many samples as a render without interruption.
+#[test]
+fn resumed_sample_counts_are_those_of_a_whole_render() {
+    let truth: Vec<_> =
+        (0..36).map(|i| Truth { sigma: f64::from(1 + i * i % 40), ..NOISY }).collect();
+    let done = |s: &Schedule| s.tiles.iter().map(|t| t.done).collect::<Vec<_>>();
+    for adaptive in [false, true] {
+        let (whole, _) = Model { aligned: false, ..Model::exact(truth.clone()) }
+            .finish(until(spp(300), adaptive));
+        for first in [2, 6, 8, 10, 22, 33, 50, 75, 128, 150] {
+            let mut model = Model { aligned: false, ..Model::exact(truth.clone()) };
+            let mut state = None;
+            for end in [first, first + 2, first + 3, 2 * first, 300] {
+                let settings = until(spp(end), adaptive);
+                let mut schedule = model.schedule(settings);
+                let counts = model.counts[0].iter().zip(&model.counts[1]);
+                let counts: Vec<_> = counts.map(|(a, b)| [*a, *b]).collect();
+                state.iter().for_each(|s: &Vec<u8>| schedule.restore(s, &counts).unwrap());
+                let reason = finish_in_pieces(&mut model, &mut schedule, 7, 32);
+                assert_eq!((reason, schedule.settings), (StoppedBy::Spp, settings));
+                state = Some(schedule.encode());
+                if end == 300 {
+                    assert_eq!(done(&schedule), done(&whole), "{first}, adaptive {adaptive}");
+                    assert_eq!(schedule.noise, whole.noise);
+                }
+            }
+        }
+    }
+}
