@@ -149,7 +149,7 @@ mod tests {
         let doublings = [8.0, 2.0];
         schedule.record_probe(&ProbeSums { doublings, ..sums });
         // The rest of the doublings, 2 (0.25 / 0.75) of 10, raises the bound to 0.08 (1 + 1 / 15).
-        let rest = 0.6 - 0.08 * 16.0 / 15.0;
+        let rest: f64 = 0.6 - 0.08 * 16.0 / 15.0;
         let noise = (rest * rest - 0.01 - 0.09).sqrt();
         assert!((schedule.noise_target(target) - noise).abs() < 1e-9 && schedule.is_probed());
         assert!((schedule.excessive_rounding().unwrap() - 0.1).abs() < 1e-9);
