@@ -10,6 +10,7 @@ use crate::dashboard::view::watch;
 use crate::dashboard::{Mode, Model};
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
+use zerkalo_render::ErrorParts;
 use zerkalo_render::schedule::StoppedBy;
 use zerkalo_render::session::{Report, Snapshot, State};
 
@@ -91,10 +92,9 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         parts.push(part(2, noise_part(model, report, noise.rmse.levels, theme)));
     }
     if let Some(error) = report.error.as_ref().filter(|_| !watching) {
-        let total = error.total();
-        let total = if total.is_finite() { number(total) } else { "without bound".to_string() };
+        let (total, others) = error_texts(error);
         parts.push(part(4, vec![dim("error "), plain(total)]));
-        parts.push(part(8, vec![dim(&error.others())]));
+        parts.push(part(8, vec![dim(&others)]));
     }
     match model.stop.seconds {
         _ if watching => {}
@@ -172,6 +172,13 @@ fn noise_part(model: &Model, report: &Report, levels: f64, theme: &Theme) -> Vec
         text.push((format!(" in {left}"), theme.text()));
     }
     text
+}
+
+/// Formats the whole error, and its parts except the noise.
+fn error_texts(error: &ErrorParts) -> (String, String) {
+    let total = error.total();
+    let total = if total.is_finite() { number(total) } else { "without bound".to_string() };
+    (total, error.others())
 }
 
 /// Draws the notice if there is one, otherwise the key hints.
