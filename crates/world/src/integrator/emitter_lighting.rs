@@ -16,7 +16,7 @@ use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::{Media, attenuated};
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
-use crate::lights::emitter_choice::{Cells, MAX_ASKED, MAX_WAYS};
+use crate::lights::emitter_choice::{Cells, MAX_WAYS};
 use crate::lights::emitters::{EmissiveSource, Emitters, Sampled};
 use crate::world::{LightSource, World};
 use zerkalo_kernel::bvh::{Hit, Ray};
@@ -197,16 +197,14 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let (origin, weighted) = (self.interaction.ray_origin(), glossy.lanes.any());
         let choices = emitters.choices.iter().zip(&self.candidates.occluders.emitters);
         for (index, (choice, occluders)) in choices.enumerate() {
-            // A highlight may show any one of the emitters.
-            let few = choice.emitters().len() <= MAX_ASKED;
-            let asking = self.interaction.highlight_mask & L::mask(few);
+            // Highlights and reflections may show any one of the emitters.
+            let shown = self.interaction.highlight_mask | glossy.lanes;
+            let asking = shown & L::mask(choice.few());
             let choosing = L::mask(true).and_not(asking);
             let asked = if asking.any() { choice.emitters() } else { &[] };
             for number in asked {
                 let number = *number as usize;
-                let Some(mut source) = self.sample_emitter(number, origin) else { break };
-                let density = source.light.density * emitters.expected(number, origin);
-                source.light.density = density.min(L::from_f64(L::MAX));
+                let Some(source) = self.sample_emitter(number, origin) else { break };
                 let rays = source.visible.then_some(glossy);
                 let arrives = asking & source.light.irradiance.x.gt(L::zero());
                 self.add_emitter(&source, Sampled::One(number), (rays, arrives), occluders);

@@ -238,7 +238,8 @@ impl<S: Float> Emitters<S> {
     #[inline(never)]
     pub fn expected<L: SimdFloat<Scalar = S>>(&self, index: usize, receivers: Vec3<L>) -> L {
         let Some((choice, place)) = self.place_of.get(index) else { return L::one() };
-        self.choices[*choice as usize].expected_at(receivers, *place)
+        let choice = &self.choices[*choice as usize];
+        if choice.few() { L::one() } else { choice.expected_at(receivers, *place) }
     }
 
     /// Samples a point of the emitter with the number `index` for each of the receivers at
