@@ -52,13 +52,23 @@ impl<L: SimdFloat> Vertex<'_, L> {
     ) -> Shadow<L> {
         let World { lights, geometry, .. } = self.world;
         let Shadow { mut occluded, passed } = self.shadow(occluded, ray, distance, media);
-        lights.emitters.for_objects::<L>(sampled, |index, on_emitter| {
-            let lanes = on_emitter & lit.and_not(occluded);
-            occluded = occluded | lights.emitters.covered(index, geometry, ray, distance, lanes);
-            if let Some((media, primitive)) = media.zip(lights.emitters.primitive(index)) {
-                occluded = occluded | (on_emitter & media.hidden(primitive));
+        let emitters = &lights.emitters;
+        match sampled {
+            Sampled::One(index) => {
+                let lanes = lit.and_not(occluded);
+                occluded = occluded | emitters.covered(index, geometry, ray, distance, lanes);
+                if let Some((media, primitive)) = media.zip(emitters.primitive(index)) {
+                    occluded = occluded | media.hidden(primitive);
+                }
             }
-        });
+            Sampled::Each(chosen) => emitters.for_objects::<L>(chosen, |index, on_emitter| {
+                let lanes = on_emitter & lit.and_not(occluded);
+                occluded = occluded | emitters.covered(index, geometry, ray, distance, lanes);
+                if let Some((media, primitive)) = media.zip(emitters.primitive(index)) {
+                    occluded = occluded | (on_emitter & media.hidden(primitive));
+                }
+            }),
+        }
         Shadow { occluded, passed }
     }
 }

@@ -16,13 +16,13 @@ use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::{Media, attenuated};
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
-use crate::lights::emitter_choice::{Cells, MAX_ASKED, MAX_WAYS};
-use crate::lights::emitters::Sampled;
+use crate::lights::emitter_choice::{Cells, MAX_WAYS};
+use crate::lights::emitters::{EmissiveSource, Emitters, Sampled};
 use crate::world::{LightSource, World};
 use zerkalo_kernel::bvh::{Hit, Ray};
 use zerkalo_kernel::lanes::{MAX_WIDTH, Mask, SimdFloat, Vec3, distinct};
 use zerkalo_kernel::primitive::PrimitiveSet;
-use zerkalo_scene::light::LightSample;
+use zerkalo_scene::light::{Emitter, LightSample};
 use zerkalo_scene::material::{BsdfQuery, BsdfValue};
 
 /// Returns the weight of a sample by the power heuristic: p^2 / (p^2 + q^2) for its density `p` and
@@ -46,9 +46,42 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     media: Option<Media<'_, L>>,
     out: &mut Radiance<L>,
 ) {
-    let Ray { origin, direction } = path.ray;
     let emitters = &world.lights.emitters;
-    emitters.for_visible_lights(&path.ray, (t_max, lanes), |index, light, source| {
+    let seen = Seen { path, t_max, lanes, media };
+    if emitters.choices.is_empty() {
+        for (light, source) in emitters.visible_lights() {
+            seen.add(light, source, || None, out);
+        }
+    } else {
+        seen.add_chosen(emitters, out);
+    }
+    let escaped = lanes.and_not(t_max.lt(L::from_f64(L::MAX)));
+    if !world.lights.environments.is_empty() && escaped.any() {
+        visible_environments(world, path, escaped, media, out);
+    }
+}
+
+/// Radiance of the lights with a size along the rays of a packet before the distance `t_max`.
+struct Seen<'a, L: SimdFloat> {
+    path: &'a Path<L>,
+    t_max: L,
+    lanes: L::Mask,
+    media: Option<Media<'a, L>>,
+}
+
+impl<L: SimdFloat> Seen<'_, L> {
+    /// Adds the radiance of `light` to `out`. `expected` returns the factor of the density of its
+    /// points.
+    #[inline(always)]
+    fn add(
+        &self,
+        light: &Emitter<L::Scalar>,
+        source: &EmissiveSource<L::Scalar>,
+        expected: impl FnOnce() -> Option<L>,
+        out: &mut Radiance<L>,
+    ) {
+        let Self { path, t_max, lanes, media } = *self;
+        let Ray { origin, direction } = path.ray;
         let t = light.hit(origin, direction);
         let seen = lanes & t.lt(t_max);
         if seen.none() {
@@ -56,15 +89,23 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
         }
         let mut radiance = path.throughput * L::splat(light.radiance);
         if path.lobe_pdf.lt(L::from_f64(L::MAX)).any() {
-            let pdf = path.light_density(emitters, (index, light), t, L::from_id(0));
+            let mut pdf = path.light_density(light, t, L::from_id(0));
+            if let Some(expected) = expected() {
+                pdf *= expected;
+            }
             radiance = radiance * power_heuristic(path.lobe_pdf, pdf);
         }
         radiance = attenuated(media, radiance, t);
         out.groups[source.group] += source.emitted(radiance).masked(seen);
-    });
-    let escaped = lanes.and_not(t_max.lt(L::from_f64(L::MAX)));
-    if !world.lights.environments.is_empty() && escaped.any() {
-        visible_environments(world, path, escaped, media, out);
+    }
+
+    /// Adds the radiance of many lights, among which paths choose.
+    #[inline(never)]
+    fn add_chosen(&self, emitters: &Emitters<L::Scalar>, out: &mut Radiance<L>) {
+        let (receiver, limits) = (self.path.receiver(), (self.t_max, self.lanes));
+        emitters.for_visible_lights(&self.path.ray, limits, |index, light, source| {
+            self.add(light, source, || Some(emitters.expected(index, receiver)), out);
+        });
     }
 }
 
@@ -114,7 +155,10 @@ impl<L: SimdFloat> Vertex<'_, L> {
             if let Some(light) = &source.light
                 && path.lobe_pdf.lt(L::from_f64(L::MAX)).any()
             {
-                let pdf = path.light_density(emitters, (index, light), hit.t, hit.triangle);
+                let mut pdf = path.light_density(light, hit.t, hit.triangle);
+                if !emitters.choices.is_empty() {
+                    pdf *= emitters.expected(index, path.receiver());
+                }
                 radiance = radiance * power_heuristic(path.lobe_pdf, pdf);
             }
             self.out.groups[source.group] += source.emitted(radiance).masked(lanes);
@@ -141,8 +185,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         for (index, occluders) in self.candidates.occluders.emitters.iter().enumerate() {
             let Some(source) = self.sample_emitter(index, origin) else { break };
             let rays = source.visible.then_some(&glossy);
-            let lanes = L::mask(true);
-            self.add_emitter(&source, Sampled::One(index), (rays, lanes), occluders);
+            let arrives = source.light.irradiance.x.gt(L::zero());
+            self.add_emitter(&source, Sampled::One(index), (rays, arrives), occluders);
         }
     }
 
@@ -153,18 +197,17 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let (origin, weighted) = (self.shadow_origin::<false>(), glossy.lanes.any());
         let choices = emitters.choices.iter().zip(&self.candidates.occluders.emitters);
         for (index, (choice, occluders)) in choices.enumerate() {
-            // A highlight may show any one of the emitters.
-            let few = choice.emitters().len() <= MAX_ASKED;
-            let asking = self.interaction.highlight_mask & L::mask(few);
+            // Highlights and reflections may show any one of the emitters.
+            let shown = self.interaction.highlight_mask | glossy.lanes;
+            let asking = shown & L::mask(choice.few());
             let choosing = L::mask(true).and_not(asking);
             let asked = if asking.any() { choice.emitters() } else { &[] };
             for number in asked {
                 let number = *number as usize;
-                let Some(mut source) = self.sample_emitter(number, origin) else { break };
-                let density = source.light.density * emitters.expected(number, origin);
-                source.light.density = density.min(L::from_f64(L::MAX));
+                let Some(source) = self.sample_emitter(number, origin) else { break };
                 let rays = source.visible.then_some(glossy);
-                self.add_emitter(&source, Sampled::One(number), (rays, asking), occluders);
+                let arrives = asking & source.light.irradiance.x.gt(L::zero());
+                self.add_emitter(&source, Sampled::One(number), (rays, arrives), occluders);
             }
             if (choosing & (self.interaction.direct_mask | glossy.lanes)).none() {
                 continue;
@@ -174,27 +217,27 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 let (source, chosen) = self.sample_chosen((index, way), &cells, (origin, weighted));
                 let lanes = glossy.lanes & source.light.density.gt(L::zero());
                 let rays = ReflectedRays { lanes, share: glossy.share };
-                let rays = (Some(&rays), choosing);
+                let arrives = choosing & source.light.irradiance.max_element().gt(L::zero());
+                let rays = (Some(&rays), arrives);
                 self.add_emitter(&source, Sampled::Each(&chosen), rays, occluders);
             }
         }
     }
 
-    /// Adds the light of the point `source` on the emitters `sampled` to the samples in `lanes`. `rays`
-    /// are the reflected rays that may hit the emitters. `occluders` are the primitives that shadow rays are tested
+    /// Adds the light of the point `source` on the emitters `sampled` in the lanes in which it `arrives`.
+    /// `rays` are the reflected rays that may hit the emitters. `occluders` are the primitives that shadow rays are tested
     /// against.
     #[inline(always)]
     fn add_emitter(
         &mut self,
         source: &LightSource<LightSample<L>, L::Scalar>,
         sampled: Sampled<'_>,
-        (rays, lanes): (Option<&ReflectedRays<L>>, L::Mask),
+        (rays, arrives): (Option<&ReflectedRays<L>>, L::Mask),
         occluders: &PrimitiveSet,
     ) {
         self.out.counts.glossy = true;
         let world = self.world;
         let (origin, light) = (self.shadow_origin::<false>(), &source.light);
-        let arrives = lanes & light.irradiance.max_element().gt(L::zero());
         let arrives = arrives & self.arrives(light.wi);
         let value = self.reflected(light, arrives, rays, |_| L::one());
         let lit = value.max_element().gt(L::zero());

@@ -117,6 +117,14 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let emitters = &self.world.lights.emitters;
             for index in 0..self.candidates.occluders.emitters.len() {
                 match emitters.choices.get(index) {
+                    Some(choice) if choice.few() => {
+                        for number in choice.emitters() {
+                            let number = *number as usize;
+                            let source = self.sample_emitter(number, side.origin);
+                            let Some(source) = source else { break };
+                            self.add_scattered(rough, side, &source, Some(Sampled::One(number)));
+                        }
+                    }
                     Some(choice) => {
                         let normal = interaction.geometric;
                         let normal = if side.behind { -normal } else { normal };

@@ -1,6 +1,5 @@
 //! State of a packet of paths, and the result of tracing it.
 
-use crate::lights::emitters::Emitters;
 use crate::lights::groups::MAX_GROUPS;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
@@ -86,22 +85,16 @@ impl<L: SimdFloat> Path<L> {
 
     /// Returns the density [1/sr] with which a point of `light` is sampled that the ray hits at
     /// distance `t`, on `triangle` of a mesh. Points are sampled from the origin of the ray before
-    /// all clear panes. `index` is the number of the light in `emitters`.
+    /// all clear panes.
     #[inline(always)]
-    pub(crate) fn light_density(
-        &self,
-        emitters: &Emitters<L::Scalar>,
-        (index, light): (usize, &Emitter<L::Scalar>),
-        t: L,
-        triangle: L,
-    ) -> L {
-        let Ray { origin, direction } = self.ray;
-        let origin = direction.mul_add(-self.passed, origin);
-        let density = light.density(origin, t + self.passed, triangle);
-        match emitters.choices.is_empty() {
-            true => density,
-            false => density * emitters.expected(index, origin),
-        }
+    pub(crate) fn light_density(&self, light: &Emitter<L::Scalar>, t: L, triangle: L) -> L {
+        light.density(self.receiver(), t + self.passed, triangle)
+    }
+
+    /// Returns the origin of the ray before all clear panes.
+    #[inline(always)]
+    pub(crate) fn receiver(&self) -> Vec3<L> {
+        self.ray.direction.mul_add(-self.passed, self.ray.origin)
     }
 
     /// Returns `throughput`, limited to 2^60 in each channel. Mirrors that amplify light would let

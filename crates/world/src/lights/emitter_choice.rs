@@ -29,9 +29,9 @@ pub(crate) const MIN_EMITTERS: usize = 16;
 /// Largest number of choices at a surface from the emitters of a light group.
 pub(crate) const MAX_WAYS: usize = 2;
 
-/// Largest number of emitters of a light group that are all asked at highlights, whose light most of
-/// them do not add to: 512 lamps cost a few times as much as if some are chosen, to equal error less.
-pub(crate) const MAX_ASKED: usize = 1024;
+/// Largest number of emitters of a light group that are all asked where a highlight or a reflection
+/// may show any one of them.
+const MAX_ASKED: usize = 128;
 
 /// Largest number of clusters in a cell.
 const MAX_CLUSTERS: usize = 128;
@@ -344,6 +344,12 @@ impl<S: Float> EmitterChoice<S> {
         let share = power(place, place + 1) / power(start.emitter as usize, end.emitter as usize);
         let slots = end.slot.to_f64() - start.slot.to_f64();
         share * slots * (self.ways as f64 / self.slots as f64)
+    }
+
+    /// Returns `true` if there are few enough emitters to ask all at glossy surfaces. Rays that were
+    /// sampled from a lobe then start where all are asked.
+    pub fn few(&self) -> bool {
+        self.emitters.len() <= MAX_ASKED
     }
 
     /// Returns the numbers of the emitters in the order of the Morton curve.

@@ -235,10 +235,11 @@ impl<S: Float> Emitters<S> {
 
     /// Returns the factor of the density of emitter number `index` for receivers that choose: the
     /// mean number of samples over the directions that they may face.
-    #[inline(always)]
+    #[inline(never)]
     pub fn expected<L: SimdFloat<Scalar = S>>(&self, index: usize, receivers: Vec3<L>) -> L {
         let Some((choice, place)) = self.place_of.get(index) else { return L::one() };
-        self.choices[*choice as usize].expected_at(receivers, *place)
+        let choice = &self.choices[*choice as usize];
+        if choice.few() { L::one() } else { choice.expected_at(receivers, *place) }
     }
 
     /// Samples a point of the emitter with the number `index` for each of the receivers at
@@ -254,22 +255,17 @@ impl<S: Float> Emitters<S> {
         Some(source.with_light(source.light.as_ref()?.sample(origin, numbers)))
     }
 
-    /// Calls `test` with each emitter of `sampled` that is an object, and with its lanes.
+    /// Calls `test` with each emitter of `chosen`, and with its lanes, if some emitters are objects.
     #[inline(always)]
     pub fn for_objects<L: SimdFloat<Scalar = S>>(
         &self,
-        sampled: Sampled<'_>,
+        chosen: &[u32; MAX_WIDTH],
         mut test: impl FnMut(usize, L::Mask),
     ) {
-        match sampled {
-            Sampled::One(index) => test(index, L::mask(true)),
-            Sampled::Each(_) if self.primitives.is_empty() => {}
-            Sampled::Each(chosen) => {
-                for lane in 0..L::WIDTH {
-                    if !chosen[..lane].contains(&chosen[lane]) {
-                        test(chosen[lane] as usize, lanes_with::<L>(chosen, chosen[lane]));
-                    }
-                }
+        let lanes = if self.primitives.is_empty() { 0 } else { L::WIDTH };
+        for lane in 0..lanes {
+            if !chosen[..lane].contains(&chosen[lane]) {
+                test(chosen[lane] as usize, lanes_with::<L>(chosen, chosen[lane]));
             }
         }
     }
@@ -354,7 +350,7 @@ impl<S: Float> Emitters<S> {
     }
 
     /// Calls `seen` for each visible light with a size that `ray` may meet before `t_max` in
-    /// `lanes`.
+    /// `lanes`, if paths choose among emitters.
     #[inline(always)]
     pub fn for_visible_lights<L: SimdFloat<Scalar = S>>(
         &self,
@@ -368,16 +364,13 @@ impl<S: Float> Emitters<S> {
                 seen(index, light, source);
             }
         };
-        if self.choices.is_empty() {
-            (0..self.lights).for_each(see);
-        } else if self.lights > 0 {
-            for choice in &self.choices {
-                choice.near_rays(ray, (t_max, lanes), |index| {
-                    if (index as usize) < self.lights {
-                        see(index as usize);
-                    }
-                });
-            }
+        let choices = if self.lights > 0 { self.choices.as_slice() } else { &[] };
+        for choice in choices {
+            choice.near_rays(ray, (t_max, lanes), |index| {
+                if (index as usize) < self.lights {
+                    see(index as usize);
+                }
+            });
         }
     }
 
