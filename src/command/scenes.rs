@@ -35,8 +35,12 @@ pub fn source(path: &Path) -> Result<SceneSource, Failure> {
     if let Some(name) = name.strip_prefix(':') {
         return by_part_of_name(name).map(SceneSource::BuiltIn);
     }
-    let file = || SceneSource::File(path.to_path_buf());
-    Ok(if path.exists() { file() } else { SceneSource::of(name.trim_end_matches(".toml")) })
+    Ok(match SceneSource::of(name.trim_end_matches(".toml")) {
+        built_in @ SceneSource::BuiltIn(_) if !path.exists() => built_in,
+        SceneSource::BuiltIn(_) | SceneSource::New | SceneSource::File(_) => {
+            SceneSource::File(path.to_path_buf())
+        }
+    })
 }
 
 /// Returns the index of the built-in scene called `name`, or else of the one whose name begins with

@@ -313,23 +313,6 @@ fn warnings_are_printed_on_stderr_and_are_no_failure() {
 }
 
 #[test]
-fn help_names_every_option_and_exit_status() {
-    let desk = Desk::new();
-    let run = desk.run(&["--help"]);
-    for part in ["render", "check", "new", "128 plus"] {
-        assert!(run.out.contains(part), "no {part}");
-    }
-    let run = desk.run(&["render", "--help"]);
-    for option in
-        "--output --size --spp --noise --rmse --time --threads --seed --precision --sampler \
-         --uniform --bits --exposure --tone --stats"
-            .split(' ')
-    {
-        assert!(run.out.contains(option), "no {option}");
-    }
-}
-
-#[test]
 fn progress_in_a_log_is_lines() {
     let desk = Desk::new();
     let run = desk.render("a.png", &["--time", "1.3", "--threads", "1"]);

@@ -153,3 +153,46 @@ fn stories_of_the_shell() {
     }
     assert!(failures.is_empty(), "{failures}");
 }
+
+/// Checks that renders of the shipped scenes are written by the deadline, and that 85 % or more end
+/// with a noise in the interval that was forecast.
+#[test]
+#[ignore = "takes five minutes on an idle machine: cargo test --test program deadlines -- --ignored"]
+fn deadlines_of_shipped_scenes_are_kept() {
+    let desk = Desk::new();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let entries = fs::read_dir(folder).unwrap().flatten().map(|entry| entry.path());
+    let mut scenes: Vec<_> =
+        entries.filter(|path| path.extension() == Some("toml".as_ref())).collect();
+    scenes.sort();
+    let (mut late, mut forecasts, mut within) = (Vec::new(), 0, 0);
+    for (i, scene) in scenes.iter().enumerate() {
+        let seconds = 2 + i % 4;
+        let name = scene.to_str().unwrap();
+        let start = Instant::now();
+        let args =
+            ["render", name, "-o", "a.png", "--stats", "s.json", "--noise", "1e-9", "--time"];
+        let run = desk.run(&[&args[..], &[&seconds.to_string()]].concat());
+        let elapsed = start.elapsed().as_secs_f64();
+        assert_eq!(run.status, 0, "{name}: {}", run.err);
+        if elapsed > seconds as f64 {
+            late.push(format!("{name}: {elapsed:.2} of {seconds} s"));
+        }
+        let stats: serde_json::Value =
+            serde_json::from_slice(&fs::read(desk.path("s.json")).unwrap()).unwrap();
+        let line =
+            run.err.lines().find_map(|line| line.split_once(": noise ")?.1.split_once(" 8-bit"));
+        let Some(((low, high), noise)) = line
+            .and_then(|(range, _)| range.split_once(" to "))
+            .zip(stats["noise_levels"].as_f64())
+        else {
+            continue;
+        };
+        let [low, high] = [low, high].map(|end| end.parse::<f64>().unwrap());
+        forecasts += 1;
+        within += usize::from((low - 0.005..=high + 0.005).contains(&noise));
+        println!("{name}: {seconds} s, {elapsed:.2} s, {noise:.3} in {low} to {high}");
+    }
+    println!("{} of {} late, {within} of {forecasts} as forecast", late.len(), scenes.len());
+    assert!(late.is_empty() && 100 * within >= 85 * forecasts, "{late:?}");
+}
