@@ -311,10 +311,14 @@ fn noted_files() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("d.obj", obj("f 1 2 2\n"), "a triangle without area was left out"),
         ("e.obj", obj("f 2 3 1\n"), "a triangle that equals another one was left out"),
         ("f.obj", obj("f 1 2\n"), "a face of fewer than three corners was left out"),
-        ("g.obj", obj("v 1 1 0\nf 1 4 2 3\n"), "a polygon whose outline crosses itself"),
-        ("h.obj", obj("mtllib none.mtl\n"), "no colours: none.mtl"),
+        ("g.obj", obj("v 1 1.5 0\nf 1 4 2 3\n"), "a polygon whose outline crosses itself"),
+        ("h.obj", obj("mtllib none.mtl\n"), "no colours: "),
         ("i.obj", obj("mtllib ../x.mtl\n"), "no colours: \"../x.mtl\" is not in the mesh's folder"),
-        ("j.obj", obj("usemtl red\nf 3 2 1\n"), "a material that no library before it defines"),
+        (
+            "j.obj",
+            obj("mtllib other.mtl\nusemtl red\nf 3 2 1\n"),
+            "a material that no library before it defines",
+        ),
         ("k.obj", obj("mtllib bad.mtl\n"), "a colour of a material cannot be read"),
         ("l.obj", obj("mtllib map.mtl\n"), "a texture of a material was not read"),
         ("m.obj", obj("vt nan 0\nf 1/1 3/1 2/1\n"), "texture coordinates that are no numbers"),
@@ -356,6 +360,7 @@ fn every_note_of_a_reader_is_shown() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     fs::write(path("bad.mtl"), "newmtl a\nKd x\n").unwrap();
+    fs::write(path("other.mtl"), "newmtl b\nKd 1 1 1\n").unwrap();
     fs::write(path("map.mtl"), "newmtl a\nmap_Kd t.png\n").unwrap();
     let mut all = String::from("ambient.color = [1, 1, 1]\n");
     let files = noted_files();
