@@ -72,8 +72,7 @@ pub(super) fn creased(
         sums[root(&mut parent, corner) as usize] += angle * normal(corner);
     }
     // The root of a tree is its lowest corner, so that it gets its index first.
-    let mut normals = Vec::new();
-    let mut index = vec![0u32; parent.len()];
+    let (mut normals, mut index) = (Vec::new(), vec![0u32; parent.len()]);
     for corner in corners {
         let root = root(&mut parent, corner) as usize;
         if root == corner as usize {
@@ -82,9 +81,8 @@ pub(super) fn creased(
         }
         index[corner as usize] = index[root];
     }
-    let corners = index.as_chunks().0.to_vec();
-    let depth = tangent_depth(positions, triangles, &normals, &corners);
-    CornerNormals { normals, corners, depth }
+    let depth = tangent_depth(positions, triangles, &normals, index.as_chunks().0);
+    CornerNormals { normals, corners: index.as_chunks().0.to_vec(), depth }
 }
 
 /// Returns the largest distance between a corner of a triangle and the tangent plane at another

@@ -85,7 +85,9 @@ impl<'a> Builder<'a> {
         let grown_vertices = grown([self.positions.len(), vertices, self.positions.capacity()]);
         let grown_triangles = grown([self.triangles.len(), triangles, self.triangles.capacity()]);
         let bytes = VERTEX_BYTES * grown_vertices + TRIANGLE_BYTES * grown_triangles;
-        if let Some(missing) = missing_memory(bytes).filter(|_| bytes > 0) {
+        if bytes > 0
+            && let Some(missing) = missing_memory(bytes)
+        {
             let found = format!("the mesh of {} vertices or more {missing}", self.positions.len());
             return Err(self.source.fault(found, "a smaller mesh, or more free memory"));
         }
