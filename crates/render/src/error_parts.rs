@@ -28,6 +28,8 @@ pub struct ErrorParts {
     pub quantization: f64,
     /// Light that the model leaves out, such as `no bounces`. It is no part of the total.
     pub left_out: Vec<&'static str>,
+    /// `true` if the render ends at a target of the total.
+    pub is_target: bool,
 }
 
 impl ErrorParts {
@@ -99,6 +101,7 @@ mod tests {
             probed_pixels: 2720,
             quantization: ROUNDING_TO_8_BITS,
             left_out: vec!["no bounces", "no caustics"],
+            is_target: false,
         };
         assert_eq!(
             parts.to_string(),

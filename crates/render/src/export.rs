@@ -86,8 +86,10 @@ const SETTINGS: &str = "Settings";
 /// Text that precedes the display transform in the value of [`SETTINGS`].
 const DISPLAY: &str = ", exposure ";
 
-/// Returns the metadata entries about samples and noise.
-fn film_entries(report: &Report) -> [(&'static str, String); 6] {
+/// Returns the metadata entries about samples and noise. Only a render that ends at its error
+/// states it: parts of it are not measured in regions, in merged parts and after other targets, and
+/// equal pictures have equal files.
+fn film_entries(report: &Report) -> impl Iterator<Item = (&'static str, String)> {
     let spp = &report.spp;
     let noise = match report.noise {
         Some(n) => format!(
@@ -96,14 +98,15 @@ fn film_entries(report: &Report) -> [(&'static str, String); 6] {
         ),
         None => "unknown".to_string(),
     };
-    [
-        ("Samples per pixel", format!("{:.2} ({}-{})", spp.mean, spp.min, spp.max)),
-        ("Noise", noise),
-        ("Error", report.error.as_ref().map_or("unknown".to_string(), |error| error.to_string())),
-        ("Bad samples", report.bad_samples.to_string()),
-        ("Saturated samples", report.saturated_samples.to_string()),
-        ("Saturated pixels", report.saturated_pixels.to_string()),
-    ]
+    let error = report.error.as_ref().filter(|error| error.is_target);
+    [("Samples per pixel", format!("{:.2} ({}-{})", spp.mean, spp.min, spp.max)), ("Noise", noise)]
+        .into_iter()
+        .chain(error.map(|error| ("Error", error.to_string())))
+        .chain([
+            ("Bad samples", report.bad_samples.to_string()),
+            ("Saturated samples", report.saturated_samples.to_string()),
+            ("Saturated pixels", report.saturated_pixels.to_string()),
+        ])
 }
 
 /// Parses the display transform in the value of the metadata entry `Settings`.

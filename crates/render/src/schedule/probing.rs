@@ -82,6 +82,7 @@ impl Schedule {
             probed_pixels: if self.measurable.cut_paths { self.probe.pixels } else { 0 },
             quantization,
             left_out: left_out.to_vec(),
+            is_target: self.settings.stop.error.is_some(),
         })
     }
 
