@@ -150,7 +150,6 @@ fn files_hold_provenance_metadata() {
         ("Seed", "42"),
         ("Samples per pixel", "8.00 (8-8)"),
         ("Noise", ""),
-        ("Error", "error "),
         ("Bad samples", "0"),
         ("Saturated samples", "0"),
         ("Saturated pixels", "0"),
@@ -159,7 +158,10 @@ fn files_hold_provenance_metadata() {
     ] {
         assert!(text.contains(&format!("{key}\0{value}")), "{key}: {value}");
     }
-    assert!(text.contains("exposure -0.5 EV"));
+    assert!(text.contains("exposure -0.5 EV") && !text.contains("Error\0"));
+    desk.render("b.png", &["--spp", "8", "--error", "0.001"]);
+    let bytes = fs::read(desk.path("b.png")).unwrap();
+    assert!(String::from_utf8_lossy(&bytes).contains("Error\0error "));
 }
 
 /// Checks that samples beyond the film's range are reported. Mirrors that amplify light at every
