@@ -6,9 +6,9 @@ use crate::schedule::{SAMPLE_ALIGNMENT, Schedule};
 use std::ops::Range;
 
 /// Reciprocal of the largest share of a render's rays that the first probe may cost.
-const FIRST_SHARE: u64 = 64;
+const FIRST_SHARE: u64 = 128;
 /// Reciprocal of the largest share of a render's rays that all probes together may cost.
-const SHARE: u64 = 128;
+const SHARE: u64 = 256;
 /// Number of rays per primitive after which the scene is compiled in double precision. Compiling a
 /// primitive takes about as long as four rays.
 const RAYS_PER_PRIMITIVE: u64 = 256;

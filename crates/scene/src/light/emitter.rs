@@ -171,36 +171,37 @@ pub(super) fn sample_sphere<L: SimdFloat>(
     PointSample { wi, distance, density, pdf: density }
 }
 
-/// Samples a point of each lane's rectangle by solid angle.
+/// Samples a point of each lane's rectangle by solid angle. `axis` returns the axis with a number; one
+/// that is the same in all lanes is built at each use, because nine vectors do not stay in registers.
 #[inline(always)]
 pub(super) fn sample_rectangle<L: SimdFloat>(
     to_center: Vec3<L>,
-    axes: [Vec3<L>; 3],
+    axis: impl Fn(usize) -> Vec3<L>,
     size: [L; 2],
     sides: LaneSides<L>,
     (u, v): (L, L),
 ) -> PointSample<L> {
-    let ([x, y, height], behind) = lifted(local_of(&axes, to_center), sides);
+    let ([x, y, height], behind) = lifted(local_of(&axis, to_center), sides);
     let rectangle = SphericalRectangle::new(size, [x, y, height]);
     let [x, y] = rectangle.sample(u, v);
     let height = L::select(behind, -height, height);
-    let (wi, distance) = towards(&axes, [x, y, height]);
+    let (wi, distance) = towards(&axis, [x, y, height]);
     let density = rectangle.density(distance);
     PointSample { wi, distance, density, pdf: density }
 }
 
-/// Samples a point of each lane's disk by area.
+/// Samples a point of each lane's disk by area. `axis` is as in [`sample_rectangle`].
 #[inline(always)]
 pub(super) fn sample_disk<L: SimdFloat>(
     to_center: Vec3<L>,
-    axes: [Vec3<L>; 3],
+    axis: impl Fn(usize) -> Vec3<L>,
     (radius, area): (L, L),
     (u, v): (L, L),
 ) -> PointSample<L> {
-    let local = local_of(&axes, to_center);
+    let local = local_of(&axis, to_center);
     let (x, y, _) = warp::disk(u, v);
     let (x, y) = (x.mul_add(radius, local[0]), y.mul_add(radius, local[1]));
-    let (wi, distance) = towards(&axes, [x, y, local[2]]);
+    let (wi, distance) = towards(&axis, [x, y, local[2]]);
     let density = density_of_area(area, distance, local[2]);
     PointSample { wi, distance, density, pdf: density }
 }
@@ -368,13 +369,14 @@ impl<S: Float> Emitter<S> {
                 sample_sphere(to_center, L::splat(*radius), self.sides.lanes(), (u, v))
             }
             Surface::Rectangle { center, axes, size } => {
-                let (to_center, axes) = (Vec3::splat(*center) - origin, axes.map(Vec3::splat));
-                sample_rectangle(to_center, axes, size.map(L::splat), self.sides.lanes(), (u, v))
+                let (to_center, size) = (Vec3::splat(*center) - origin, size.map(L::splat));
+                let axis = |i: usize| Vec3::splat(axes[i]);
+                sample_rectangle(to_center, axis, size, self.sides.lanes(), (u, v))
             }
             Surface::Disk { center, axes, radius } => {
-                let (to_center, axes) = (Vec3::splat(*center) - origin, axes.map(Vec3::splat));
+                let to_center = Vec3::splat(*center) - origin;
                 let (radius, area) = (L::splat(*radius), L::from_f64(self.area));
-                sample_disk(to_center, axes, (radius, area), (u, v))
+                sample_disk(to_center, |i| Vec3::splat(axes[i]), (radius, area), (u, v))
             }
             Surface::DistantDisk { axis, one_minus_cos } => {
                 let local = warp::cone(u, v, L::splat(*one_minus_cos));
@@ -410,14 +412,13 @@ impl<S: Float> Emitter<S> {
             }
             Surface::Rectangle { center, axes, size } => {
                 let to_center = Vec3::splat(*center) - origin;
-                let axes = axes.map(Vec3::splat);
-                let (local, _) =
-                    self.sides.lifted(local_of(&axes, to_center), L::mask(self.sides.both));
+                let local = local_of(&|i| Vec3::splat(axes[i]), to_center);
+                let (local, _) = self.sides.lifted(local, L::mask(self.sides.both));
                 SphericalRectangle::new(size.map(L::splat), local).density(distance)
             }
             Surface::Disk { center, axes, .. } => {
-                let axes = axes.map(Vec3::splat);
-                let [_, _, height] = local_of(&axes, Vec3::splat(*center) - origin);
+                let to_center = Vec3::splat(*center) - origin;
+                let [_, _, height] = local_of(&|i| Vec3::splat(axes[i]), to_center);
                 density_of_area(L::from_f64(self.area), distance, height)
             }
             Surface::DistantDisk { one_minus_cos, .. } => density_of_cone(L::splat(*one_minus_cos)),
@@ -468,16 +469,16 @@ fn density_of_cone<L: SimdFloat>(one_minus_cos: L) -> L {
 }
 
 #[inline(always)]
-fn local_of<L: SimdFloat>(axes: &[Vec3<L>; 3], v: Vec3<L>) -> [L; 3] {
-    axes.map(|axis| axis.dot(v))
+fn local_of<L: SimdFloat>(axis: &impl Fn(usize) -> Vec3<L>, v: Vec3<L>) -> [L; 3] {
+    [axis(0).dot(v), axis(1).dot(v), axis(2).dot(v)]
 }
 
-/// Returns the direction and the length of the vector with the components [x, y, z] along `axes`.
+/// Returns the direction and the length of the vector with the components [x, y, z] along the axes.
 #[inline(always)]
-fn towards<L: SimdFloat>([across, up, normal]: &[Vec3<L>; 3], [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
+fn towards<L: SimdFloat>(axis: &impl Fn(usize) -> Vec3<L>, [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
     let distance = (x * x + y * y + z * z).sqrt();
     let inverse = L::one() / distance;
-    ((*across * x + *up * y + *normal * z) * inverse, distance)
+    ((axis(0) * x + axis(1) * y + axis(2) * z) * inverse, distance)
 }
 
 /// Returns where each ray meets the plane of a flat emitter: the distance, negative for rays that
@@ -489,9 +490,9 @@ fn plane_hit<L: SimdFloat>(
     to_center: Vec3<L>,
     direction: Vec3<L>,
 ) -> (L, [L; 2]) {
-    let axes = axes.map(Vec3::splat);
-    let [center_x, center_y, height] = local_of(&axes, to_center);
-    let [x, y, slope] = local_of(&axes, direction);
+    let axis = |i: usize| Vec3::splat(axes[i]);
+    let [center_x, center_y, height] = local_of(&axis, to_center);
+    let [x, y, slope] = local_of(&axis, direction);
     let meets_front = slope.lt(L::zero()) & height.lt(L::zero());
     let t = L::select(meets_front, height / slope, -L::one());
     (t, [x.mul_add(t, -center_x), y.mul_add(t, -center_y)])
