@@ -5,9 +5,10 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use zerkalo_render::film::testing::{TestFilm, header};
 use zerkalo_render::film::{
-    Display, Estimator, Film, Header, LightWeights, TILE_PIXELS, Thumbnail, Tone,
+    Display, Estimator, Film, Header, LightWeights, TILE_PIXELS, Thumbnail,
 };
 use zerkalo_render::image_file::{Depth, ImageOutput};
+use zerkalo_scene::Tone;
 
 /// Returns a film with `groups` light groups that shows a noisy gradient. Each pixel has two
 /// replicates (halves of the samples) of 64 samples each. The noise is estimated from the
@@ -46,7 +47,8 @@ fn noise(c: &mut Criterion) {
     let mut group = c.benchmark_group("noise of a tile");
     for groups in [1, 4] {
         let film = film(640, 480, groups);
-        for (name, tone) in Tone::NAMED {
+        for tone in Tone::ALL {
+            let name = tone.name();
             let display = Display { exposure_ev: 0.0, tone };
             let estimator = Estimator::new(&film.header.scales, &white(groups), &display);
             let mut tile = (0..film.tile_count()).cycle();

@@ -79,8 +79,8 @@ fn with_defaults(command: Command, defaults: &[(&'static str, &'static str)]) ->
 /// Cause of an error: byte offset in the text, finding and help.
 type Fault = (usize, String, String);
 
-fn apply(text: &str, path: &Path) -> Result<(), Diagnostic> {
-    let located = |(at, found, help): Fault| Diagnostic::at(path, text, at, found, help);
+fn apply(text: &str, path: &Path) -> Result<(), Box<Diagnostic>> {
+    let located = |(at, found, help): Fault| Box::new(Diagnostic::at(path, text, at, found, help));
     let document = Document::parse(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);
         located((at, format!("it is not TOML: {}", error.message()), String::new()))

@@ -249,7 +249,7 @@ fn lamps(count: usize, numbers: &mut Numbers) -> Vec<String> {
                 };
             }
         };
-        let visible = i % 5 != 0;
+        let visible = !i.is_multiple_of(5);
         format!("[[light]]\n{shape}\nvisible = {visible}\n")
     };
     (0..count).map(lamp).collect()

@@ -61,7 +61,7 @@ impl ErrorParts {
         let part = |value: Option<f64>, sign: &str| match value {
             None => "not measured".to_string(),
             Some(value) if value.is_infinite() => "without bound".to_string(),
-            Some(value) if value == 0.0 => "0".to_string(),
+            Some(0.0) => "0".to_string(),
             Some(value) => format!("{sign}{value:.2}"),
         };
         let (rounding, cut) = (part(self.rounding, ""), part(self.cut_paths, "<= "));

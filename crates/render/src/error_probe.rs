@@ -164,7 +164,7 @@ impl Packet {
         weights: &LightWeights,
     ) -> (Vec<Pair>, u64) {
         let (mut pairs, mut rays) = (vec![Pair::default(); self.pixels.len()], 0);
-        for replicate in 0..2 {
+        for replicate in [0, 1] {
             let pixels = self.pixels.iter().copied();
             let Some(mut tile) = tracer.tile(replicate, self.rectangle, pixels) else { continue };
             tile.radiance_shared::<1>(0, |packet, radiance| {

@@ -306,11 +306,11 @@ impl Schedule {
     /// changed.
     fn rest_of_interrupted(&mut self) -> Vec<Job> {
         let settings = self.settings;
-        let continues = |whole: &Box<Self>| {
-            let stop = Stop { spp: settings.stop.spp, ..whole.settings.stop };
-            Settings { stop, ..whole.settings } == settings
-        };
-        let Some(whole) = self.interrupted.take().filter(continues) else { return Vec::new() };
+        let Some(whole) = self.interrupted.take() else { return Vec::new() };
+        let stop = Stop { spp: settings.stop.spp, ..whole.settings.stop };
+        if (Settings { stop, ..whole.settings }) != settings {
+            return Vec::new();
+        }
         let ended = std::mem::replace(self, Self { settings, ..*whole });
         (self.samples, self.rays) = (ended.samples, ended.rays);
         let mut ends: Vec<u32> = ended.tiles.iter().map(|tile| tile.done).collect();

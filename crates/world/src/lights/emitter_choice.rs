@@ -506,7 +506,7 @@ mod tests {
             let number = |k: u32| f64::from((i + 1) * k % 1009) / 1009.0;
             let center = DVec3::new(number(331), number(577), number(811));
             let ball = BoundingSphere { center, radius: 0.01 };
-            let normal = (i % 3 == 0).then(|| (center - DVec3::splat(0.5)).normalize());
+            let normal = i.is_multiple_of(3).then(|| (center - DVec3::splat(0.5)).normalize());
             (i, EmitterBounds { ball, normal, power: if i == 7 { 1.0 } else { 0.01 * number(97) } })
         };
         (0..count).map(emitter).collect()
