@@ -51,7 +51,7 @@ impl Restorer {
 }
 
 /// Runs the program again as a child process if this process leads its session, as in `ssh -t host
-/// zerkalo`. sshd closes the terminal when the leader ends, before a [`Restorer`] can write. This
+/// zerkalo`. sshd closes the terminal when the leader ends, before a `Restorer` can write. This
 /// process passes signals on, restores the terminal if a signal ends the child, and returns the exit
 /// status. Returns `None` if it does not lead a session on a terminal.
 ///
