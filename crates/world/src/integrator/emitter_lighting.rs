@@ -224,9 +224,9 @@ impl<L: SimdFloat> Vertex<'_, L> {
         }
     }
 
-    /// Adds the light of the point `source` on the emitters `sampled` in the lanes in which it `arrives`.
-    /// `rays` are the reflected rays that may hit the emitters. `occluders` are the primitives that shadow rays are tested
-    /// against.
+    /// Adds the light of the point `source` on the emitters `sampled` in the lanes in which it
+    /// `arrives`. `rays` are the reflected rays that may hit the emitters. `occluders` are the
+    /// primitives that shadow rays are tested against.
     #[inline(always)]
     fn add_emitter(
         &mut self,
