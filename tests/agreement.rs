@@ -15,7 +15,13 @@ const FEW_SAMPLES: u32 = 64;
 const MANY_SAMPLES: u32 = 512;
 
 /// Files of scenes whose pictures take seconds with [`SAMPLES`] samples.
-const SLOW_SCENES: [&str; 3] = ["torus.toml", "gallery-triptych.toml", "water-glass.toml"];
+const SLOW_SCENES: [&str; 5] = [
+    "torus.toml",
+    "gallery-triptych.toml",
+    "water-glass.toml",
+    "gallery-dusk.toml",
+    "gallery-three-balls.toml",
+];
 
 /// Files of scenes with textures or bumps, whose noise is estimated too low with [`SAMPLES`]
 /// samples.

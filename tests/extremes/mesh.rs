@@ -156,7 +156,7 @@ fn check(rays: usize) {
 /// times as many.
 #[test]
 fn extreme_14_mesh_watertight() {
-    check(40_000);
+    check(20_000);
 }
 
 #[test]

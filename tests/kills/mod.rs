@@ -21,7 +21,7 @@ use zerkalo_scene::Recovery;
 use zerkalo_terminal::{ENTER, LEAVE};
 
 /// Number of programs that are started and ended.
-const RUNS: usize = 40;
+const RUNS: usize = 20;
 /// Number of programs in the ignored test.
 const MANY_RUNS: usize = 400;
 /// Number of concurrent programs per processor. It is limited because each program also traces with
