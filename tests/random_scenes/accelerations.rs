@@ -33,4 +33,4 @@ fn same_bytes(scene: &Scene) -> Verdict {
     Verdict::Same
 }
 
-scene_tests!(accelerations, 0..24, many_accelerations, many(), same_bytes);
+scene_tests!(accelerations, 0..16, many_accelerations, many(), same_bytes);

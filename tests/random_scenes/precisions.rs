@@ -80,4 +80,4 @@ fn single_is_double(scene: &Scene) -> Verdict {
     verdict
 }
 
-scene_tests!(precisions, 0..24, many_precisions, many(), single_is_double);
+scene_tests!(precisions, 0..16, many_precisions, many(), single_is_double);

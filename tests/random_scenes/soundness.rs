@@ -60,7 +60,7 @@ fn replicates_are_equal(scene: &Scene) -> Verdict {
     Verdict::Same
 }
 
-scene_tests!(soundness, 0..24, many_soundness, many(), sound);
+scene_tests!(soundness, 0..16, many_soundness, many(), sound);
 
 /// Checks scenes whose objects have positions and sizes from 1e-6 to 1e6.
 #[test]
@@ -68,7 +68,7 @@ fn wild_soundness() {
     compare("soundness", seeds_of(Layout::Wild, 20..60), sound);
 }
 
-scene_tests!(replicates, 0..24, many_replicates, many(), replicates_are_equal);
+scene_tests!(replicates, 0..16, many_replicates, many(), replicates_are_equal);
 
 #[test]
 fn wild_replicates() {
