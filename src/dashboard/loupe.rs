@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use zerkalo_render::film::{Detail, TILE, Window};
 use zerkalo_render::session::{Snapshot, State};
+use zerkalo_scene::edit;
 
 /// Largest columns and rows of the loupe, without its border.
 const LARGEST: [u16; 2] = [32, 16];
@@ -124,10 +125,10 @@ impl Model {
         self.loupe.target.get_or_insert(center);
     }
 
-    /// Returns the film pixel at the middle of the window with the largest error in the largest
-    /// mirror, or in the whole picture if there is none. Before the first estimate of errors, it is
-    /// the window with most contrast. Unless `is_new`, the present target is kept if its window has
-    /// half as much.
+    /// Returns the film pixel at the middle of the window with the largest error in the scene's mirror
+    /// (see [`edit::mirror`]), else in the largest reflecting object, else in the whole picture. Before
+    /// the first estimate of errors, it is the window with most contrast. Unless `is_new`, the present
+    /// target is kept if its window has half as much.
     fn noisiest(&self, snapshot: &Snapshot, is_new: bool) -> Option<[usize; 2]> {
         let (hits, picture) = (snapshot.first_hits.as_deref()?, snapshot.picture.as_ref()?);
         let [columns, rows] = [hits.columns, hits.rows];
@@ -137,7 +138,13 @@ impl Model {
         let mut counts = BTreeMap::new();
         let mirrors = hits.texels.iter().filter(|hit| hit.reflects);
         mirrors.for_each(|hit| *counts.entry(hit.object).or_insert(0) += 1);
-        let largest = counts.into_iter().max_by_key(|(_, count)| *count).map(|(object, _)| object);
+        let mirror = edit::mirror(self.scene(), None);
+        let is_the_mirror = |object: Option<u32>| {
+            let object = object.and_then(|i| self.scene().objects.get(i as usize));
+            object.zip(mirror.as_ref()).is_some_and(|(object, name)| object.names_material(name))
+        };
+        let largest = counts.into_iter().max_by_key(|(o, count)| (is_the_mirror(*o), *count));
+        let largest = largest.map(|(object, _)| object);
         let is_mirror = |i: usize| largest.is_none_or(|object| hits.texels[i].object == object);
         let (to_8, radiance) = (self.display.to_8(), picture.mixed(&snapshot.weights));
         let levels: Vec<_> = radiance.iter().map(|c| to_8(c.map(f64::from))[1]).collect();

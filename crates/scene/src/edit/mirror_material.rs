@@ -72,6 +72,9 @@ mod tests {
         assert_eq!(at(&scene, Some(Target::Object(3))), "mirror", "the cube does not reflect");
         assert_eq!(at(&scene, Some(Target::Material("floor".into()))), "floor");
         assert_eq!(at(&scene, Some(Target::Camera)), "mirror");
+        let dusk = include_str!("../../../../scenes/gallery-dusk.toml");
+        let dusk = Scene::parse(dusk, "gallery-dusk.toml").unwrap();
+        assert_eq!(at(&dusk, None), "mirror", "wood reflects 4 %, brass less than silver");
         scene.materials.get_mut("green").unwrap().transmission = 0.5;
         assert_eq!(at(&scene, Some(Target::Object(3))), "green", "glass is as rough as a mirror");
         scene.materials.get_mut("green").unwrap().transmission = 0.0;

@@ -86,11 +86,14 @@ fn add_tree(scene: &Scene, target: Target, list: &mut Vec<(Section, Target)>) {
     parts.into_iter().for_each(|part| add_tree(scene, part, list));
 }
 
-/// Returns the material with the largest reflection coefficient among those of `objects` and their
+/// Returns the material that reflects most at normal incidence among those of `objects` and their
 /// parts; `None` if none reflects.
 pub(super) fn mirror_of<'a>(scene: &'a Scene, objects: &'a [Object]) -> Option<&'a str> {
     let names = objects.iter().flat_map(Object::materials);
-    let known = names.filter_map(|name| Some((name, scene.materials.get(name)?.reflection)));
+    let known = names.filter_map(|name| {
+        let material = scene.materials.get(name)?;
+        Some((name, material.reflection * material.f0().0.into_iter().fold(0.0, f64::max)))
+    });
     let reflecting = known.filter(|(_, k)| *k > 0.0);
     reflecting.reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(name, _)| name)
 }
