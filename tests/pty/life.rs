@@ -68,6 +68,29 @@ fn panic_message_follows_restored_terminal() {
     assert_eq!(bytes.matches(LEAVE).count(), 1);
 }
 
+/// Session and process group of the caller have the ID 0 in a PID namespace of its own.
+#[test]
+fn program_runs_in_a_pid_namespace_of_its_own() {
+    let unshare = ["unshare", "--map-root-user", "--pid", "--fork"];
+    let probe = Command::new(unshare[0]).args(&unshare[1..]).arg("true").output();
+    if !probe.is_ok_and(|run| run.status.success()) {
+        eprintln!("not checked: no PID namespaces here");
+        return;
+    }
+    let fixture = Fixture::with_room();
+    let command = [&unshare[..], &[PROGRAM, "room.toml"]].concat();
+    let terminal = Terminal::start(&Start {
+        command: &command,
+        folder: fixture.0.path(),
+        size: [80, 24],
+        env: &[],
+        replies: true,
+    });
+    wait_for_picture(&terminal);
+    terminal.send("q");
+    assert_eq!(terminal.end().0, 0);
+}
+
 #[test]
 fn without_terminal_one_line_names_the_alternative() {
     let fixture = Fixture::with_room();

@@ -7,7 +7,8 @@
 
 use crate::signals::{SIGNALLED, SignalQueue};
 use crate::{LEAVE, screen};
-use rustix::process::{Pid, Signal, getpid, getsid, kill_process};
+use nix::unistd::{getpid, getsid};
+use rustix::process::{Pid, Signal, kill_process};
 use rustix::termios::tcgetattr;
 use std::env;
 use std::io::{self, Write};

@@ -1,8 +1,7 @@
 //! Signals to the process, as events in a channel.
 
 use crossbeam_channel::{Receiver, unbounded};
-use rustix::process::getpgrp;
-use rustix::termios::tcgetpgrp;
+use nix::unistd::{getpgrp, tcgetpgrp};
 use signal_hook::consts::{
     SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1, SIGWINCH, SIGXCPU, SIGXFSZ,
 };
@@ -104,7 +103,7 @@ fn ignored_signals() -> u64 {
 }
 
 /// Returns `true` if the process receives the keys of a terminal: Ctrl-C sends SIGINT to the
-/// foreground process group.
+/// foreground process group. A process group of another PID namespace has the ID 0.
 pub fn is_in_foreground() -> bool {
     let own = getpgrp();
     let foreground = [tcgetpgrp(io::stdin()), tcgetpgrp(io::stdout()), tcgetpgrp(io::stderr())];
