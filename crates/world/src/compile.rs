@@ -476,7 +476,7 @@ impl<L: SimdFloat> World<L> {
         Self {
             smooth,
             colored,
-            simple: !smooth && !colored && geometry.is_plain_list(),
+            simple: !smooth && !colored && !lights.has_emitters() && geometry.is_plain_list(),
             surface_textures: textures,
             shadows: scene.trace.ray_types >= RayTypes::Shadows && !geometry.is_empty(),
             depth: if materials.has_secondary() { scene.trace.max_depth } else { 0 },

@@ -81,8 +81,9 @@ pub struct World<L: SimdFloat> {
     pub(super) smooth: bool,
     /// `true` if vertex colours or textures multiply the albedo of some surface.
     pub(super) colored: bool,
-    /// `true` if the world is neither `smooth` nor `colored` and all its primitives are in linear
-    /// lists, without BVH and bounding boxes. Kernels have a faster instance for such worlds.
+    /// `true` if the world is neither `smooth` nor `colored`, has no emitters, and all its primitives
+    /// are in linear lists, without BVH and bounding boxes. Kernels have a faster instance for such
+    /// worlds.
     pub(super) simple: bool,
     pub(super) surface_textures: SurfaceTextures<L>,
     pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,

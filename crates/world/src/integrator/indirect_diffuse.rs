@@ -167,7 +167,7 @@ impl<L: SimdFloat> Integrator<'_, L> {
                 }
                 None => {
                     let (path, lanes) = (&mut start.path, start.lanes);
-                    integrator.trace_opaque::<false, true>(path, lanes, reservoir.as_mut(), out);
+                    integrator.trace_opaque::<false>(path, lanes, reservoir.as_mut(), out);
                 }
             }
             let Some(reservoir) = reservoir else { break };

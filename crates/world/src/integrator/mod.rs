@@ -63,10 +63,9 @@ impl<L: SimdFloat> World<L> {
             TransmissionIntegrator { base: integrator, nested_dielectrics }
                 .trace(&mut start, None, out);
         } else {
-            match (self.simple, !self.lights.has_emitters()) {
-                (true, true) => integrator.trace_opaque::<true, false>(path, active, None, out),
-                (false, true) => integrator.trace_opaque::<false, false>(path, active, None, out),
-                (_, false) => integrator.trace_opaque::<false, true>(path, active, None, out),
+            match self.simple {
+                true => integrator.trace_opaque::<true>(path, active, None, out),
+                false => integrator.trace_opaque::<false>(path, active, None, out),
             }
         }
     }

@@ -15,11 +15,10 @@ impl<L: SimdFloat> Integrator<'_, L> {
     /// paths start in the lanes `active`. `path` is overwritten. `reservoir` collects the hits from
     /// which indirect diffuse light may bounce.
     ///
-    /// `EMITTERS` is `true` if the world has emitters or indirect diffuse light. `SIMPLE` is then
-    /// `false`; otherwise it is the value of [`World::simple`](crate::World::simple). `SIMPLE` has
-    /// the same meaning in all called functions.
+    /// `SIMPLE` is the value of [`World::simple`](crate::World::simple), here and in all called
+    /// functions. It is `false` if the world has indirect diffuse light.
     #[inline(never)]
-    pub fn trace_opaque<const SIMPLE: bool, const EMITTERS: bool>(
+    pub fn trace_opaque<const SIMPLE: bool>(
         &self,
         path: &mut Path<L>,
         mut active: L::Mask,
@@ -34,7 +33,7 @@ impl<L: SimdFloat> Integrator<'_, L> {
             } else {
                 world.geometry.closest_masked(&path.ray, &candidates.primary, active)
             };
-            if EMITTERS {
+            if !SIMPLE {
                 visible_emitters(world, path, hit.t, active, None, out);
             }
             active = add_background(world, path, hit.t, active, None, out);
@@ -52,17 +51,17 @@ impl<L: SimdFloat> Integrator<'_, L> {
                 out: &mut *out,
             };
             let mut bouncing = None;
-            if EMITTERS && let Some(reservoir) = &mut reservoir {
+            if !SIMPLE && let Some(reservoir) = &mut reservoir {
                 bouncing = Some(reservoir.offer(&vertex, &MediumStack::vacuum(), None));
             }
-            vertex.shade::<SIMPLE>(&hit, EMITTERS, bouncing, |_| {
+            vertex.shade::<SIMPLE>(&hit, bouncing, |_| {
                 let lanes = if is_last { L::mask(false) } else { interaction.reflecting };
                 ReflectedRays { lanes, share: L::one() }
             });
             if is_last || interaction.reflecting.none() {
                 return;
             }
-            active = vertex.sample_reflection::<SIMPLE>(EMITTERS);
+            active = vertex.sample_reflection::<SIMPLE>();
             if active.none() {
                 return;
             }

@@ -121,8 +121,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let behind = self.behind(branch, &mut hit);
         let media =
             Some(Media { nested_dielectrics: self.nested_dielectrics, stack: &branch.media });
-        let emitters = world.lights.has_emitters();
-        if emitters {
+        if world.lights.has_emitters() {
             visible_emitters(world, &branch.path, hit.t, branch.lanes, media, out);
         }
         let lanes = add_background(world, &mut branch.path, hit.t, branch.lanes, media, out);
@@ -144,7 +143,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             let media = interface_hit.as_ref().map_or(*stack, |hit| hit.stack_reflected(stack));
             reservoir.offer(&vertex, &media, reversed.as_ref())
         });
-        vertex.shade::<false>(&hit, emitters, bouncing, |vertex| {
+        vertex.shade::<false>(&hit, bouncing, |vertex| {
             if bounce == depth {
                 return ReflectedRays { lanes: L::mask(false), share: L::one() };
             }
@@ -154,7 +153,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             return false;
         }
         let Some(interface_hit) = &interface_hit else {
-            branch.lanes = vertex.sample_reflection::<false>(emitters);
+            branch.lanes = vertex.sample_reflection::<false>();
             branch.coincident = reversed;
             branch.bounce += 1;
             return branch.lanes.any();

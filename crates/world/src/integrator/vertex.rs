@@ -48,19 +48,18 @@ pub(crate) fn add_background<L: SimdFloat>(
 }
 
 impl<L: SimdFloat> Vertex<'_, L> {
-    /// Adds the light that the surfaces emit and reflect. `emitters` is `true` if the world may
-    /// have emitters. `bouncing` are the lanes whose indirect light a diffuse bounce computes;
-    /// `None` if there are no bounces. `rays` returns the reflected rays that the integrator
-    /// follows.
+    /// Adds the light that the surfaces emit and reflect. `bouncing` are the lanes whose indirect
+    /// light a diffuse bounce computes; `None` if there are no bounces. `rays` returns the reflected
+    /// rays that the integrator follows.
     #[inline(always)]
     pub fn shade<const SIMPLE: bool>(
         &mut self,
         hit: &Hit<L>,
-        emitters: bool,
         bouncing: Option<L::Mask>,
         rays: impl FnOnce(&Self) -> ReflectedRays<L>,
     ) {
         let world = self.world;
+        let emitters = !SIMPLE && world.lights.has_emitters();
         if emitters && world.lights.emitters.has_objects() {
             self.surface_emission(hit);
         }
@@ -77,10 +76,9 @@ impl<L: SimdFloat> Vertex<'_, L> {
 
     /// Replaces the rays of the paths by reflected rays, with directions sampled from the
     /// reflection lobes. Returns the lanes whose paths continue: their new throughput is at least
-    /// [`min_throughput`](World::min_throughput). The density of the directions is computed only if
-    /// `emitters` is `true`.
+    /// [`min_throughput`](World::min_throughput).
     #[inline(always)]
-    pub fn sample_reflection<const SIMPLE: bool>(&mut self, emitters: bool) -> L::Mask {
+    pub fn sample_reflection<const SIMPLE: bool>(&mut self) -> L::Mask {
         let (world, interaction, query) = (self.world, self.interaction, self.query());
         let throughput = self.path.throughput;
         let mut numbers = None;
@@ -93,7 +91,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             if !SIMPLE && world.smooth {
                 direction = interaction.reflect_into_hemisphere(direction);
             }
-            if emitters {
+            if !SIMPLE && world.lights.has_emitters() {
                 let pdf = eval_lobe(world, interaction, &query, index, direction).density;
                 path.lobe_pdf = L::select(lanes, pdf, path.lobe_pdf);
             }
