@@ -56,7 +56,7 @@ done < "$scratch/blocks"
 
 if wanted extremes "$@"; then
     echo "extremes: the tests" >&2
-    cargo test --test scene --test world --test render --test application --test engine \
+    cargo test --release --test scene --test world --test render --test application --test engine \
         -- --nocapture extreme all_thirty < /dev/null > "$scratch/tests.txt"
     grep -o 'extreme [0-9][0-9] | .*' "$scratch/tests.txt" | LC_ALL=C sort -u > "$scratch/cells.txt"
     awk -F ' [|] ' '

@@ -126,7 +126,7 @@ fn shrunk(mut scene: Scene) -> Scene {
 }
 
 #[test]
-#[ignore = "half a minute: cargo test --test engine agreement:: -- --ignored"]
+#[ignore = "half a minute: cargo test --release --test engine agreement:: -- --ignored"]
 fn deliberate_errors_are_detected() {
     let scene = |name| small(shipped(name));
     // Each of these errors shifts the picture by at least 15 standard errors, three times the

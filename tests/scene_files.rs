@@ -25,7 +25,7 @@ fn golden(path: &Path, text: &str) {
     assert!(
         stored == text,
         "{} is not what the program says now. It says:\n{text}\nIf that is right: \
-         ZERKALO_BLESS=1 cargo test --test program scene_files::",
+         ZERKALO_BLESS=1 cargo test --release --test program scene_files::",
         path.display()
     );
 }

@@ -1,7 +1,7 @@
 //! Every scene of the folder `scenes`: its inventory and its picture are compared with expected
 //! ones.
 //!
-//! `ZERKALO_BLESS=1 cargo test --test engine scenes::` writes the expected values.
+//! `ZERKALO_BLESS=1 cargo test --release --test engine scenes::` writes the expected values.
 //! `ZERKALO_BLESS=NAME.toml` writes those of one scene, and keeps the stored ones of all others.
 
 use crate::harness::*;

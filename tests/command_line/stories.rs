@@ -157,7 +157,7 @@ fn stories_of_the_shell() {
 /// Checks that renders of the shipped scenes are written by the deadline, and that 85 % or more end
 /// with a noise in the interval that was forecast.
 #[test]
-#[ignore = "takes five minutes on an idle machine: cargo test --test program deadlines -- --ignored"]
+#[ignore = "five minutes, idle machine: cargo test --release --test program deadlines -- --ignored"]
 fn deadlines_of_shipped_scenes_are_kept() {
     let desk = Desk::new();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");

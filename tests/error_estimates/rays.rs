@@ -119,7 +119,7 @@ fn rays_at(curve: &[Point], square: f64) -> f64 {
 /// `ZERKALO_FIRST` on. `ZERKALO_SEEDS` is the number of seeds for each scene, by default 4. Scenes
 /// of single balls get 48 times as many seeds.
 #[test]
-#[ignore = "twenty minutes: cargo test --test engine error_estimates::rays::survey_of_rays -- --ignored --nocapture"]
+#[ignore = "twenty minutes: cargo test --release --test engine survey_of_rays -- --ignored --nocapture"]
 fn survey_of_rays() {
     let variable =
         |name: &str, default| std::env::var(name).map_or(default, |v| v.parse().unwrap());

@@ -1,9 +1,9 @@
 //! Survey over random sparse and dense scenes. Compares the reported error with the true error, and
 //! the number of rays of adaptive pictures with that of uniform pictures of the same true error.
 //!
-//! The short form runs with all tests. The long form prints a table of 300 scenes: `cargo test
-//! --test engine survey_of_300 -- --ignored --nocapture`. It runs in parts: `ZERKALO_FIRST` and
-//! `ZERKALO_SCENES` select scenes.
+//! The short form runs with all tests. The long form prints a table of 300 scenes:
+//! `cargo test --release --test engine survey_of_300 -- --ignored --nocapture`. It runs in parts:
+//! `ZERKALO_FIRST` and `ZERKALO_SCENES` select scenes.
 
 use crate::error_estimates::coverage::Balls;
 use crate::error_estimates::rays::{Point, ray_ratio};
@@ -203,7 +203,7 @@ fn reported_error_of_few_pixels_is_that_of_all() {
 /// ratios must be within 0.9 to 1.15. No ratio may exceed 1.5, or 2 with lamps far out of focus, with a
 /// certainty of 99.9 %.
 #[test]
-#[ignore = "hours: cargo test --test engine survey_of_300 -- --ignored --nocapture"]
+#[ignore = "hours: cargo test --release --test engine survey_of_300 -- --ignored --nocapture"]
 fn survey_of_300_scenes() {
     let variable =
         |name: &str, default| std::env::var(name).map_or(default, |v| v.parse().unwrap());

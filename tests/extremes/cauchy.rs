@@ -217,7 +217,7 @@ fn extreme_07_cauchy() {
 }
 
 #[test]
-#[ignore = "a million lines: cargo test --test engine extremes:: -- --ignored"]
+#[ignore = "a million lines: cargo test --release --test engine extremes:: -- --ignored"]
 fn extreme_07_cauchy_at_length() {
     check_cauchy(4 * LINES);
 }
@@ -337,7 +337,7 @@ fn extreme_13_slivers() {
 }
 
 #[test]
-#[ignore = "a million lines: cargo test --test engine extremes:: -- --ignored"]
+#[ignore = "a million lines: cargo test --release --test engine extremes:: -- --ignored"]
 fn extreme_13_slivers_at_length() {
     check_slivers(4 * LINES);
 }

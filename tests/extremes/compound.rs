@@ -166,7 +166,7 @@ fn extreme_08_parity() {
 }
 
 #[test]
-#[ignore = "a million rays in each precision: cargo test --test engine extremes:: -- --ignored"]
+#[ignore = "a million rays each: cargo test --release --test engine extremes:: -- --ignored"]
 fn extreme_08_parity_at_length() {
     check_parity(10_000);
 }

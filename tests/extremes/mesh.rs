@@ -160,7 +160,7 @@ fn extreme_14_mesh_watertight() {
 }
 
 #[test]
-#[ignore = "2e7 rays, a minute: cargo test --test engine extremes:: -- --ignored"]
+#[ignore = "2e7 rays, a minute: cargo test --release --test engine extremes:: -- --ignored"]
 fn extreme_14_mesh_watertight_at_length() {
     check(2_000_000);
 }

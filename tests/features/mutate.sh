@@ -58,7 +58,7 @@ if [ "${1:-}" = --check ]; then
     cargo check --quiet -p zerkalo-render
     exit
 fi
-cargo test --quiet --test engine --no-run
+cargo test --release --quiet --test engine --no-run
 
 if [ $# -eq 0 ]; then
     cd "$mutations"
@@ -69,9 +69,9 @@ status=0
 for name in "$@"; do
     test=$(value "$name" test)
     # Without the mutation the copy equals the original.
-    if ! cargo test --quiet --test engine "$test" > before.log 2>&1; then
+    if ! cargo test --release --quiet --test engine "$test" > before.log 2>&1; then
         outcome="FAILS WITHOUT IT, TOO"
-    elif ZERKALO_MUTANT=$name cargo test --quiet --test engine "$test" > mutate.log 2>&1; then
+    elif ZERKALO_MUTANT=$name cargo test --release --quiet --test engine "$test" > mutate.log 2>&1; then
         outcome="NOT NOTICED"
     else
         # The message after the location of the panic.

@@ -3,9 +3,9 @@
 //! damaged, and no edit may be lost that was made at least a given time before the end. After
 //! SIGTERM and SIGHUP the terminal must be restored.
 //!
-//! The message of a failure contains the number of its run. `ZERKALO_KILL=17 cargo test --test
-//! program kills::` repeats run 17 alone, with the same keys at the same times as far as the
-//! machine permits.
+//! The message of a failure contains the number of its run.
+//! `ZERKALO_KILL=17 cargo test --release --test program kills::` repeats run 17 alone, with the same
+//! keys at the same times as far as the machine permits.
 #![cfg(unix)]
 
 mod states;
@@ -298,7 +298,7 @@ fn random_ends_damage_no_file_and_lose_no_old_edit() {
 }
 
 #[test]
-#[ignore = "minutes: cargo test --test program kills:: -- --ignored"]
+#[ignore = "minutes: cargo test --release --test program kills:: -- --ignored"]
 fn many_random_ends_damage_no_file_and_lose_no_old_edit() {
     check_runs((0..MANY_RUNS).collect());
 }
@@ -341,7 +341,7 @@ fn check_runs(numbers: Vec<usize>) {
             let plan = Plan::of(*number);
             failures.push(format!(
                 "run {number}, {:?} after {:.3} s: {what}\n  again: ZERKALO_KILL={number} cargo test \
-                 --test program kills::",
+                 --release --test program kills::",
                 plan.end,
                 plan.moment.as_secs_f64()
             ));

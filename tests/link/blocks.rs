@@ -51,7 +51,8 @@ fn errors(film: &Raster, cells: &Buffer, blocks: Blocks) -> [f64; 2] {
     sums.map(|sum| (sum / film.pixels.len() as f64).sqrt())
 }
 
-/// Measures errors and bytes: `cargo test --test program link::blocks -- --ignored --nocapture`.
+/// Measures errors and bytes:
+/// `cargo test --release --test program link::blocks -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn errors_and_bytes_of_block_characters() {

@@ -79,7 +79,7 @@ fn program_runs_in_a_pid_namespace_of_its_own() {
     }
     let fixture = Fixture::with_room();
     let command = [&unshare[..], &[PROGRAM, "room.toml"]].concat();
-    let terminal = Terminal::start(&Start {
+    let mut terminal = Terminal::start(&Start {
         command: &command,
         folder: fixture.0.path(),
         size: [80, 24],

@@ -73,7 +73,7 @@ pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
             .map_or_else(|| what.clone(), |small| failure(small, check).unwrap_or_default());
         let path = keep(name, seed, &what, &text, &last, small.as_ref().unwrap_or(&text));
         let line = format!(
-            "seed {seed}, {layout:?}: {what}\n    {}\n    ZERKALO_SEED={seed} cargo test --test \
+            "seed {seed}, {layout:?}: {what}\n    {}\n    ZERKALO_SEED={seed} cargo test --release --test \
              engine random_scenes::{name}",
             path.display()
         );

@@ -8,7 +8,7 @@ const INTRODUCTION: &str = "\
 # Scene files
 
 <!-- Generated from the tables in the program; do not edit.
-     ZERKALO_BLESS=1 cargo test --test program scene_files:: regenerates it. -->
+     ZERKALO_BLESS=1 cargo test --release --test program scene_files:: regenerates it. -->
 
 A scene file is [TOML](https://toml.io) text in UTF-8. Only objects are needed: every other table
 and every key with a default may be left out. Unknown keys are errors.

@@ -28,8 +28,8 @@ fn every_command_has_a_label_of_its_own() {
     }
 }
 
-/// Compares docs/keys.md with the command table. `ZERKALO_BLESS=1 cargo test --test program
-/// stories::` rewrites docs/keys.md.
+/// Compares docs/keys.md with the command table.
+/// `ZERKALO_BLESS=1 cargo test --release --test program stories::` rewrites docs/keys.md.
 #[test]
 fn keys_page_matches_command_table() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/keys.md");
@@ -40,7 +40,8 @@ fn keys_page_matches_command_table() {
     let written = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         written == page,
-        "docs/keys.md differs from the command table: ZERKALO_BLESS=1 cargo test --test program stories::"
+        "docs/keys.md differs from the command table: ZERKALO_BLESS=1 cargo test --release --test \
+         program stories::"
     );
 }
 

@@ -1,5 +1,6 @@
 //! Screens with rendered pictures, written to files of terminal sequences for visual inspection.
-//! `ZERKALO_SCREENS=folder cargo test --test application paint -- --ignored` writes the files.
+//! `ZERKALO_SCREENS=folder cargo test --release --test application paint -- --ignored` writes the
+//! files.
 //! `cat` shows such a file in a terminal that has the size of the screen.
 
 use crate::dashboard::Model;
