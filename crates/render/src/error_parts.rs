@@ -45,6 +45,16 @@ impl ErrorParts {
         self.rounding.is_none() || self.cut_paths.is_none_or(f64::is_infinite)
     }
 
+    /// Returns the sign before the total: it is a lower limit if a part was not measured, and an
+    /// upper limit if most of it is the upper limit of cut paths, as after few probes.
+    pub fn sign(&self) -> &'static str {
+        match self.largest() {
+            _ if self.is_open() => ">= ",
+            "cut paths" => "<= ",
+            _ => "",
+        }
+    }
+
     /// Returns the name of the largest part.
     pub fn largest(&self) -> &'static str {
         let parts = [
@@ -82,7 +92,7 @@ impl fmt::Display for ErrorParts {
         let total = self.total();
         match total {
             _ if total.is_infinite() => write!(f, "error without bound")?,
-            _ => write!(f, "error {}{total:.2} levels", if self.is_open() { ">= " } else { "" })?,
+            _ => write!(f, "error {}{total:.2} levels", self.sign())?,
         }
         write!(f, ": noise {:.2}, {}", self.noise, self.others())
     }
@@ -112,6 +122,8 @@ mod tests {
         let unbounded = ErrorParts { cut_paths: Some(f64::INFINITY), ..parts.clone() };
         assert!(unbounded.to_string().starts_with("error without bound: noise 0.52"));
         assert_eq!((unbounded.largest(), unbounded.is_open()), ("cut paths", true));
+        let early = ErrorParts { cut_paths: Some(9.0), ..parts.clone() };
+        assert!(early.to_string().starts_with("error <= 9.59 levels: noise 0.52"), "{early}");
         let uncut = ErrorParts { cut_paths: Some(0.0), ..parts.clone() };
         assert!(uncut.to_string().contains(", cut paths 0 in 2720 pixels, 8 bits"), "{uncut}");
         let unmeasured = ErrorParts { rounding: None, quantization: 0.0, ..parts };

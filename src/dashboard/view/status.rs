@@ -177,7 +177,10 @@ fn noise_part(model: &Model, report: &Report, levels: f64, theme: &Theme) -> Vec
 /// Formats the whole error, and its parts except the noise.
 fn error_texts(error: &ErrorParts) -> (String, String) {
     let total = error.total();
-    let total = if total.is_finite() { number(total) } else { "without bound".to_string() };
+    let total = match total.is_finite() {
+        true => format!("{}{}", error.sign(), number(total)),
+        false => "without bound".to_string(),
+    };
     (total, error.others())
 }
 
