@@ -59,8 +59,15 @@ impl Captures {
         contrast: f64,
         neighbours: impl Iterator<Item = f64>,
     ) {
-        let (dark, light) =
-            neighbours.fold((low, 0.0f64), |(dark, light), n| (dark.min(n), light.max(n)));
+        let bright = low + STEADY * (high - low);
+        let (mut dark, mut light) = (low, 0.0f64);
+        for neighbour in neighbours {
+            // Whatever the other neighbours are, `steady` is not above `bright`.
+            if neighbour >= bright {
+                return;
+            }
+            (dark, light) = (dark.min(neighbour), light.max(neighbour));
+        }
         let steady = dark + STEADY * (high - dark);
         let Some(class) = LEAST_EXCESS.iter().rposition(|least| high - dark >= *least) else {
             return;

@@ -101,9 +101,13 @@ impl<L: SimdFloat> SphericalRectangle<L> {
         let b0 = -y0 / (h2 + y0 * y0).sqrt();
         let b1 = y1 / (h2 + y1 * y1).sqrt();
         let left = -x0 / (h2 + x0 * x0).sqrt();
-        let angle = |cos: L| (one - cos * cos).max(L::zero()).sqrt().atan2(cos);
-        let k = L::from_f64(TAU) - angle(-(b1 * left)) - angle(-(left * b0));
-        let (sin, cos) = u.mul_add(self.solid_angle, k).sin_cos();
+        // The angles on the left side have the cosines `p` and `q`. The azimuth is `u` times the
+        // solid angle, less these angles: by theorems of addition, without arc functions.
+        let (p, q) = (-(b1 * left), -(left * b0));
+        let [sin_p, sin_q] = [p, q].map(|cos| (one - cos * cos).max(L::zero()).sqrt());
+        let (cos_k, sin_k) = (p * q - sin_p * sin_q, -(sin_p * q + p * sin_q));
+        let (sin_u, cos_u) = (u * self.solid_angle).sin_cos();
+        let (sin, cos) = (sin_u * cos_k + cos_u * sin_k, cos_u * cos_k - sin_u * sin_k);
         let f = (cos * b0 - b1) / sin;
         let c2 = one / (f * f + b0 * b0);
         // Lower bound of the divisors 1 - c2 and 1 - s^2. It prevents a division by zero.
@@ -127,8 +131,9 @@ impl<L: SimdFloat> SphericalRectangle<L> {
 }
 
 /// Returns the solid angle of a rectangle as the sum of two triangles. The formula of Van Oosterom
-/// and Strackee (1983) for a triangle is an arc tangent, which has no cancellation at small angles.
-/// The parameters are fields of [`SphericalRectangle`]; `z` is its `height`.
+/// and Strackee (1983) for half of a triangle's is an arc tangent, which has no cancellation at small
+/// angles. The halves are at most pi together, so that one arc tangent has their sum. The parameters
+/// are fields of [`SphericalRectangle`]; `z` is its `height`.
 #[inline(always)]
 fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) -> L {
     let corner = |x: L, y: L| {
@@ -140,10 +145,11 @@ fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) 
     let volume = z.abs() * area * a.1 * c.1;
     let triangle = |third: (Vec3<L>, L)| {
         let below = L::one() + diagonal + a.0.dot(third.0) + c.0.dot(third.0);
-        let half = (volume * third.1).atan2(below);
-        half + half
+        (volume * third.1, below)
     };
-    triangle(b) + triangle(d)
+    let ((above_b, below_b), (above_d, below_d)) = (triangle(b), triangle(d));
+    let half = (above_b * below_d + below_b * above_d).atan2(below_b * below_d - above_b * above_d);
+    half + half
 }
 
 /// Triangle as seen from a receiver point, sampled by solid angle.

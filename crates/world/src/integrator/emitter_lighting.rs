@@ -207,7 +207,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 let Some(source) = self.sample_emitter(number, origin) else { break };
                 let rays = source.visible.then_some(glossy);
                 let arrives = asking & source.light.irradiance.x.gt(L::zero());
-                self.add_emitter(&source, Sampled::One(number), (rays, arrives), occluders);
+                self.add_chosen(&source, Sampled::One(number), (rays, arrives), occluders);
             }
             if (choosing & (self.interaction.direct_mask | glossy.lanes)).none() {
                 continue;
@@ -219,9 +219,21 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 let rays = ReflectedRays { lanes, share: glossy.share };
                 let arrives = choosing & source.light.irradiance.max_element().gt(L::zero());
                 let rays = (Some(&rays), arrives);
-                self.add_emitter(&source, Sampled::Each(&chosen), rays, occluders);
+                self.add_chosen(&source, Sampled::Each(&chosen), rays, occluders);
             }
         }
+    }
+
+    /// [`Self::add_emitter`] among many, as a function of its own.
+    #[inline(never)]
+    fn add_chosen(
+        &mut self,
+        source: &LightSource<LightSample<L>, L::Scalar>,
+        sampled: Sampled<'_>,
+        rays: (Option<&ReflectedRays<L>>, L::Mask),
+        occluders: &PrimitiveSet,
+    ) {
+        self.add_emitter(source, sampled, rays, occluders);
     }
 
     /// Adds the light of the point `source` on the emitters `sampled` in the lanes in which it
@@ -241,15 +253,19 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let arrives = arrives & self.arrives(light.wi);
         let value = self.reflected(light, arrives, rays, |_| L::one());
         let lit = value.max_element().gt(L::zero());
-        let shadow = |vertex: &Self, lit| {
-            let ray = Ray { origin, direction: light.wi };
-            let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
-            let end = (&ray, light.distance);
-            vertex.emitter_shadow(sampled, end, (lit, occluded), vertex.media)
-        };
-        self.add_light(source.group, lit, shadow, |vertex, _| {
-            source.emitted(vertex.unoccluded(value, light))
-        });
+        self.add_light(
+            source.group,
+            lit,
+            #[inline(always)]
+            |vertex, lit| {
+                let ray = Ray { origin, direction: light.wi };
+                let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
+                let end = (&ray, light.distance);
+                vertex.emitter_shadow(sampled, end, (lit, occluded), vertex.media)
+            },
+            #[inline(always)]
+            |vertex, _| source.emitted(vertex.unoccluded(value, light)),
+        );
     }
 
     /// Samples a point of an emitter of choice number `index`; see [`Emitters::sample_chosen`].
