@@ -19,7 +19,6 @@ use zerkalo_scene::disk::open_regular;
 use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{Recovery, SceneFile, Tone, state_folder};
 use zerkalo_terminal::Environment;
-use zerkalo_world::Precision;
 
 pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
@@ -46,10 +45,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     reporter.mute();
     // A continued render keeps its seed, sampler and precision.
     let (sampling, precision) = match &checkpoint {
-        Some(checkpoint) => {
-            let precision = Precision::from_name(&checkpoint.header.film.precision);
-            (checkpoint.sampling(), precision.unwrap_or_default())
-        }
+        Some(checkpoint) => (checkpoint.sampling(), checkpoint.header.film.precision),
         None => {
             let sampling = SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol };
             (sampling, args.precision.precision)

@@ -47,7 +47,7 @@ pub fn rotate(scene: &Scene, target: &Target, degrees: f64) -> Result<Edit, Edit
         }
         Target::Camera | Target::View(_) | Target::Material(_) | Target::Settings(_) => {
             let found = format!("{} cannot be rotated", target.label(scene));
-            return Err(EditError::new(&found, "Select an object or a light."));
+            return Err(EditError::new(found, "Select an object or a light."));
         }
     }
     let label = format!("rotate {}", target.label(scene));

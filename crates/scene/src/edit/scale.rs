@@ -22,7 +22,7 @@ pub fn scale(scene: &Scene, target: &Target, factor: f64, about: DVec3) -> Resul
     }
     let Ok(mut body) = body(scene, target) else {
         let found = format!("{} cannot be scaled", target.label(scene));
-        return Err(EditError::new(&found, "Select an object, a part of one or a light."));
+        return Err(EditError::new(found, "Select an object, a part of one or a light."));
     };
     let mut next = scene.clone();
     scale_body(&mut body, factor, to_compound(scene, target).transform_point3(about));

@@ -37,7 +37,7 @@ pub fn move_by(scene: &Scene, target: &Target, by: [f64; 3]) -> Result<Edit, Edi
         }
         Target::Material(_) | Target::Settings(_) => {
             let found = format!("{} cannot be moved", target.label(scene));
-            return Err(EditError::new(&found, "Select an object, a light or the camera."));
+            return Err(EditError::new(found, "Select an object, a light or the camera."));
         }
     }
     let label = format!("move {}", target.label(scene));

@@ -34,7 +34,8 @@ pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
 pub fn prepare(
     path: PathBuf,
     display: Display,
-    (viewport, downloads): (ImageViewport, bool),
+    viewport: ImageViewport,
+    downloads: bool,
     results: Sender<Message>,
 ) {
     let (requested, failed) = (path.clone(), results.clone());

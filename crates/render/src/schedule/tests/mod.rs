@@ -178,7 +178,7 @@ impl Model {
 }
 
 fn until(stop: Stop, adaptive: bool) -> Settings {
-    Settings { adaptive, criterion: Criterion::Levels, rays_per_pixel: 0, stop }
+    Settings { adaptive, ..Settings::until(stop) }
 }
 
 fn noise(levels: f64) -> Stop {
