@@ -241,8 +241,8 @@ impl UpdateContext<'_> {
                 self.model.file.broken = None;
                 self.model.file.unreadable = false;
                 self.model.history.restart(scene);
-                let mut subjects = outline(self.scene()).into_iter().map(|(_, subject)| subject);
-                let found = subjects.find(|subject| subject.title(self.scene()) == title);
+                let mut targets = outline(self.scene()).into_iter().map(|(_, target)| target);
+                let found = targets.find(|target| target.title(self.scene()) == title);
                 self.model.inspector.editor = None;
                 self.select(found.unwrap_or(Target::Camera));
                 self.show();
