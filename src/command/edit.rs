@@ -4,6 +4,7 @@ use crate::command::args::EditArgs;
 use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, is_quiet, print_error, scenes, warn, write_line};
 use crate::dashboard::message::Exported;
+use crate::dashboard::preferences::Preferences;
 use crate::dashboard::run::{Ended, FaultyFile, Setup, run as run_dashboard};
 use crate::dashboard::scene_source::SceneSource;
 use std::env;
@@ -20,7 +21,7 @@ use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{Recovery, SceneFile, Tone, state_folder};
 use zerkalo_terminal::Environment;
 
-pub fn run(args: &EditArgs) -> Result<(), Failure> {
+pub fn run(args: &EditArgs, preferences: Preferences) -> Result<(), Failure> {
     let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
     let environment = terminal_environment(&format!(
         "`zerkalo render {scene} -o PICTURE.png` renders without one"
@@ -60,7 +61,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         state,
         threads: args.compute.threads(),
         options: Options::new(precision, sampling, display),
-        terminal: args.terminal.setup(environment),
+        terminal: args.terminal.setup(environment, preferences),
         trace: args.trace.clone(),
     };
     conclude(&run_dashboard(setup)?, io::stdout().lock())

@@ -235,7 +235,7 @@ impl Desk {
         if types && self.model.overlay.is_some() {
             return Vec::new();
         }
-        let command = lookup(self.model.context(), key);
+        let command = lookup(COMMANDS, self.model.context(), key);
         let mut fired: Vec<_> = command.map(|command| command.label).into_iter().collect();
         if key.code == Code::Enter {
             fired.extend(self.picked_command());

@@ -299,10 +299,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn copy_path(&mut self) {
-        let Some(path) = self.model.last_export.clone() else {
-            self.say("No picture was written yet · p writes one");
-            return;
-        };
+        let Some(path) = self.last_export() else { return };
         let text = path.display().to_string();
         if sanitized(&text) != text {
             // Control characters could run commands when pasted into a shell.

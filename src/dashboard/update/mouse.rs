@@ -59,22 +59,12 @@ impl UpdateContext<'_> {
             if !self.moves_or_rotates() {
                 self.end_gesture();
             }
-            let Mouse { column, row, modified, .. } = mouse;
             // Watched films have no camera to orbit and no objects to select.
             let is_inert = self.model.watch.is_some() && self.model.mode != Mode::Probe;
-            let (last, in_picture) = ([column, row], is_in(mouse, layout.image) && !is_inert);
-            let drag = Drag {
-                button,
-                modified,
-                last,
-                moved: false,
-                in_picture,
-                on_number: false,
-                moves: false,
-            };
-            let grabs = button == Button::Left && !modified && self.model.mode == Mode::Orbit;
+            let in_picture = is_in(mouse, layout.image) && !is_inert;
+            let grabs = button == Button::Left && !mouse.modified && self.model.mode == Mode::Orbit;
             let moves = grabs && in_picture && self.grab(&layout, mouse);
-            self.model.drag = Some(Drag { moves, ..drag });
+            self.model.drag = Some(Drag { in_picture, moves, ..Drag::new(button, mouse) });
         } else if let Some((rows, _)) = self.model.inspector_rows()
             && is_in(mouse, layout.inspector)
         {
@@ -177,18 +167,7 @@ impl UpdateContext<'_> {
         let pressed = line.and_then(|line| lines.get(line)?.entry());
         let on_number = pressed
             .is_some_and(|field| matches!(field.property.widget, Widget::Numbers | Widget::Color));
-        let Mouse { column, row, modified, .. } = mouse;
-        let (last, button) = ([column, row], Button::Left);
-        let drag = Drag {
-            button,
-            modified,
-            last,
-            moved: false,
-            in_picture: false,
-            on_number,
-            moves: false,
-        };
-        self.model.drag = Some(drag).filter(|drag| drag.on_number);
+        self.model.drag = on_number.then(|| Drag { on_number, ..Drag::new(Button::Left, mouse) });
         match line.filter(|line| lines.get(*line).and_then(PanelLine::entry).is_some()) {
             Some(line) if opens && line == cursor => self.open_row(),
             Some(line) if self.apply_field() => {

@@ -163,8 +163,9 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    pub(super) fn snap_to_ground(&mut self) {
-        let edit = edit::snap_to_ground(self.scene(), &self.model.selection);
+    /// Applies an edit of the selection, as one undo step.
+    pub(super) fn apply(&mut self, edit: fn(&Scene, &Target) -> Result<Edit, EditError>) {
+        let edit = edit(self.scene(), &self.model.selection);
         self.commit(edit, Coalesce::Single);
     }
 
@@ -242,11 +243,6 @@ impl UpdateContext<'_> {
 
     pub(super) fn purge_materials(&mut self) {
         let edit = edit::purge_materials(self.scene());
-        self.commit(edit, Coalesce::Single);
-    }
-
-    pub(super) fn own_material(&mut self) {
-        let edit = edit::own_material(self.scene(), &self.model.selection);
         self.commit(edit, Coalesce::Single);
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::dashboard::panel_lines::inspector;
 use crate::dashboard::update::Coalesce;
-use crate::dashboard::update::commands::{Command, table};
+use crate::dashboard::update::commands::Command;
 use crate::dashboard::{
     Effect, FieldLine, Focus, KeyContext, Overlay, PanelLine, PickEntry, UpdateContext,
 };
@@ -78,7 +78,8 @@ impl UpdateContext<'_> {
             let place = context.chain().position(|place| has_keys(command, place));
             place.unwrap_or(usize::MAX)
         };
-        let mut commands: Vec<_> = table().iter().filter(|c| c.is_listed(self.model)).collect();
+        let mut commands: Vec<_> =
+            self.model.preferences.commands.iter().filter(|c| c.is_listed(self.model)).collect();
         commands.sort_by_key(rank);
         let entry = |command: &Command| {
             let entry = PickEntry::of(command, watching);
@@ -108,7 +109,8 @@ impl UpdateContext<'_> {
 
     fn palette(&self) -> Vec<(PickEntry, Choice)> {
         let watching = self.model.watch.is_some();
-        let listed = table().iter().filter(|command| command.is_listed(self.model));
+        let listed =
+            self.model.preferences.commands.iter().filter(|command| command.is_listed(self.model));
         let mut list: Vec<_> =
             listed.map(|c| (PickEntry::of(c, watching), Choice::Run(c))).collect();
         if watching || self.model.file.unreadable {
