@@ -12,8 +12,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use toml_edit::{Document, Item, TableLike};
 use zerkalo_scene::Diagnostic;
-use zerkalo_scene::value::did_you_mean;
-use zerkalo_scene::value::sanitized;
+use zerkalo_scene::value::{did_you_mean, sanitized};
 use zerkalo_terminal::cells::nearest_xterm;
 use zerkalo_terminal::event::Key;
 

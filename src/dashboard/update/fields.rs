@@ -1,7 +1,6 @@
 //! Commands on the properties in the inspector and in forms.
 
-use crate::dashboard::panel_lines::RowAct;
-use crate::dashboard::panel_lines::walked;
+use crate::dashboard::panel_lines::{RowAct, walked};
 use crate::dashboard::update::Coalesce;
 use crate::dashboard::{Editor, FieldLine, KeyContext, Overlay, PanelLine, UpdateContext};
 use zerkalo_scene::edit::{self, Edit, EditError, Widget, Word};

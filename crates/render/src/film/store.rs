@@ -320,8 +320,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::testing::TestFilm;
-    use crate::film::testing::{fill, film, white};
+    use crate::film::testing::{TestFilm, fill, film, white};
 
     #[test]
     fn tiles_cover_the_film() {

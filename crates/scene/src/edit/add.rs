@@ -1,7 +1,5 @@
 //! Adding objects, lights and materials, with defaults that fit the scene.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::bounds::pivot_distance;
 use crate::edit::convert::irradiance_at;
 use crate::edit::placement::{ground_height, place_for};

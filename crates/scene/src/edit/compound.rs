@@ -1,7 +1,5 @@
 //! Compounds as trees: access to their parts, and edits that make, change and dissolve compounds.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::add::object_kinds;
 use crate::edit::properties::Word;
 use crate::edit::unique_name::free_object;

@@ -1,7 +1,5 @@
 //! Duplicating, deleting and renaming of objects, lights, materials and stored cameras.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::bounds::bounds;
 use crate::edit::compound::{body, copy_part, material, remove_part, set_body};
 use crate::edit::parse_value::name;

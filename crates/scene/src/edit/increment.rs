@@ -1,5 +1,7 @@
 //! Steps by arrow keys: numbers change to the next round number, other values to the next choice.
 
+#![allow(clippy::wildcard_enum_match_arm)]
+
 use crate::Scene;
 use crate::edit::bounds::step_length;
 use crate::edit::part::{given_key, part};

@@ -1,6 +1,8 @@
 //! Edits of scenes, as pure functions from a valid scene to an [`Edit`], or to an [`EditError`]
 //! with the reason. They use no terminal and no clock, and read only the files that a scene names.
 
+#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
+
 mod add;
 mod bounds;
 mod compound;

@@ -1,5 +1,7 @@
 //! Properties of an edit target as an inspector shows them: one row per key.
 
+#![allow(clippy::wildcard_enum_match_arm)]
+
 use crate::Scene;
 use crate::edit::convert::{AIM, KIND};
 use crate::edit::parse_value::{color, parse, show};

@@ -1,7 +1,5 @@
 //! Ready-made parts of scenes: solids of a material, a floor, a framed mirror, lights of a colour.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::add::{
     ReadyLight, add_light_as, add_object, free_color, plane_height, usual_size,
 };

@@ -1,7 +1,5 @@
 //! Edits that rotate an object or a light about the vertical.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::bounds::scene_bounds;
 use crate::edit::compound::{body, set_body};
 use crate::edit::{Edit, EditError, Target};

@@ -1,7 +1,5 @@
 //! Scaling of objects, parts and lights about a point.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::compound::{body, set_body, to_compound};
 use crate::edit::{Edit, EditError, Target, move_by};
 use crate::value::{floor_log10, round_significant, rounded_to};

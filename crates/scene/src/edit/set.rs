@@ -1,19 +1,17 @@
 //! Edits that set one value by typed text.
 
-use crate::Scene;
-use crate::TransformOp;
 use crate::edit::add::fit_mesh;
 use crate::edit::compound::{body, set_body};
-use crate::edit::convert;
 use crate::edit::convert::{AIM, KIND};
 use crate::edit::parse_value::{parse, word};
 use crate::edit::part::{exclusive_keys, field, fields, part, part_mut};
 use crate::edit::properties::is_material;
-use crate::edit::{Edit, EditError, Target};
+use crate::edit::{Edit, EditError, Target, convert};
 use crate::material::METAL_REMEDY;
 use crate::value::{
     DefaultValue, Field, KeyNode, KeyValue, PRESET, ValueType, node_at, node_at_mut,
 };
+use crate::{Scene, TransformOp};
 
 /// Sets `key` of `target` to the value in `text`. If the key is the transform of an object, `text`
 /// is a kind of step, and an identity step of this kind is appended. An empty `text` sets an

@@ -1,7 +1,5 @@
 //! Edits that move an object, a light or a camera by a vector, in scene units.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::camera::Camera;
 use crate::edit::bounds::scene_bounds;
 use crate::edit::compound::{body, in_compound, set_body};

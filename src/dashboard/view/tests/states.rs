@@ -2,8 +2,7 @@
 
 use crate::dashboard::model::{Notice, RunningExport, Tone};
 use crate::dashboard::panel_lines::scrolled;
-use crate::dashboard::testing::mirror_room;
-use crate::dashboard::testing::report;
+use crate::dashboard::testing::{mirror_room, report};
 use crate::dashboard::update::update;
 use crate::dashboard::{
     DisplayChannel, Editor, FieldList, Focus, Form, ListCursor, Message, Mode, Model,

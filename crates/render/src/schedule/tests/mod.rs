@@ -8,8 +8,7 @@ mod stops;
 use crate::film::testing::Rng;
 use crate::film::{ByMeasure, TileNoise};
 use crate::schedule::*;
-use crate::wave::JobReport;
-use crate::wave::WaveReport;
+use crate::wave::{JobReport, WaveReport};
 
 /// Value of [`TileNoise::squares`] in all simulated estimates: that of an error spread over very
 /// many pixels.
