@@ -190,13 +190,8 @@ fn wave(c: &mut Criterion) {
             LightWeights { weights: world.info().groups.weights(&scene) },
         );
         let estimator = Estimator::new(&scales, &mix, &Display::default());
-        let header = Header {
-            width: 640,
-            height: 480,
-            scales,
-            seed: 1,
-            precision: world.info().precision.to_string(),
-        };
+        let header =
+            Header { width: 640, height: 480, scales, seed: 1, precision: world.info().precision };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
         let film = Film::new(header.clone());
         let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first: 8, count: 8 });

@@ -19,7 +19,7 @@ fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 
     let sampling = sobol(0);
     let tracer = world.camera_tracer(&sampling);
     let scales = world.info.scales.clone();
-    let precision = "double".to_string();
+    let precision = zerkalo_world::Precision::Double;
     let mut film = Film::new(Header { width: 16, height: 1, scales, seed: 0, precision });
     let tile = film.slots(&[0]).remove(0).prepare();
     for replicate in [0, 1] {

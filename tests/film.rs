@@ -8,6 +8,7 @@ use zerkalo_render::film::file::FilmFileHeader;
 use zerkalo_render::film::testing::header;
 use zerkalo_render::film::{SampleFault, TileHandle, lattice_pixels, quantised_8, quantised_16};
 use zerkalo_render::image_file::{Depth, ImageOutput};
+use zerkalo_world::Precision;
 
 const WIDTH: usize = 37;
 const HEIGHT: usize = 21;
@@ -15,7 +16,7 @@ const SCALES: [f64; 2] = [268_435_456.0, 1_048_576.0];
 
 fn film_of(width: usize, height: usize, scales: &[f64]) -> Film {
     let scales = scales.to_vec();
-    Film::new(Header { width, height, scales, seed: 7, precision: "single".to_string() })
+    Film::new(Header { width, height, scales, seed: 7, precision: Precision::Single })
 }
 
 fn new_film() -> Film {

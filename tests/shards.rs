@@ -43,7 +43,7 @@ fn plan(scene: &Scene, pilot: &SyncRender, seed: u64, noise: f64, shards: u32) -
         size: scene.film.size,
         seed,
         sampler: SamplerKind::Sobol,
-        precision: pilot.state.world.info().precision.to_string(),
+        precision: pilot.state.world.info().precision,
         display: Display::default(),
         rays_per_pixel: scene.film.rays_per_pixel,
         noise_levels: noise,

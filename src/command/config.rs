@@ -3,17 +3,16 @@
 use crate::command::args::Cli;
 use crate::command::{Failure, write_line};
 use crate::dashboard::key_context::KeyContext;
-use crate::dashboard::update::commands::{COMMANDS, rebind, table};
-use crate::dashboard::view::theme::{SHIPPED_TONES, set_tones, tones};
+use crate::dashboard::preferences::Preferences;
+use crate::dashboard::update::commands::{COMMANDS, rebound};
+use crate::dashboard::view::theme::SHIPPED_TONES;
 use clap::{Arg, Command, CommandFactory};
 use std::env;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-use toml_edit::{Document, Item, Table};
+use std::path::PathBuf;
+use toml_edit::{Document, Item, TableLike};
 use zerkalo_scene::Diagnostic;
-use zerkalo_scene::value::did_you_mean;
-use zerkalo_scene::value::sanitized;
+use zerkalo_scene::value::{did_you_mean, sanitized};
 use zerkalo_terminal::cells::nearest_xterm;
 use zerkalo_terminal::event::Key;
 
@@ -33,8 +32,13 @@ const OPTIONS: [&str; 12] = [
     "bits",
 ];
 
-/// Options that the file has set: the name and the value of each.
-static OPTIONS_SET: OnceLock<Vec<(&'static str, &'static str)>> = OnceLock::new();
+/// Contents of the file. The default are the settings as shipped.
+#[derive(Default)]
+pub struct Config {
+    /// Options that the file sets: the name and the value of each.
+    options: Vec<(&'static str, &'static str)>,
+    pub preferences: Preferences,
+}
 
 /// Returns the path of the file (XDG Base Directory Specification), whether it exists or not.
 fn path() -> Option<PathBuf> {
@@ -44,20 +48,122 @@ fn path() -> Option<PathBuf> {
     Some(folder.join("zerkalo/config.toml"))
 }
 
-/// Reads the file, sets keys and colours, and returns the command line with its defaults. Without a
-/// file nothing changes.
-pub fn command_line() -> Result<Command, String> {
-    let text = path().and_then(|path| Some((std::fs::read_to_string(&path).ok()?, path)));
-    if let Some((text, path)) = text {
-        apply(&text, &path).map_err(|error| error.to_string())?;
+impl Config {
+    /// Reads the file, if there is one.
+    pub fn read() -> Result<Self, String> {
+        let text = path().and_then(|path| Some((std::fs::read_to_string(&path).ok()?, path)));
+        let Some((text, path)) = text else { return Ok(Self::default()) };
+        Self::parse(&text).map_err(|Fault { at, found, help }| {
+            Diagnostic::at(&path, &text, at, found, help).to_string()
+        })
     }
-    let defaults = OPTIONS_SET.get().map_or(&[][..], Vec::as_slice);
-    let mut command = with_defaults(Cli::command(), defaults);
-    let names: Vec<_> = command.get_subcommands().map(|c| c.get_name().to_string()).collect();
-    for name in names {
-        command = command.mut_subcommand(name, |command| with_defaults(command, defaults));
+
+    fn parse(text: &str) -> Result<Self, Fault> {
+        const TABLES: [&str; 3] = ["options", "keys", "theme"];
+        let document = Document::parse(text).map_err(|error| {
+            let at = error.span().map_or(0, |span| span.start);
+            Fault::new(at, format!("it is not TOML: {}", error.message()), "")
+        })?;
+        let (mut config, mut keys) = (Self::default(), Vec::new());
+        for Entry { key: name, at, item, item_at } in entries(document.as_table(), 0) {
+            let Some(table) = item.as_table_like().filter(|_| TABLES.contains(&name)) else {
+                return Err(unknown(at.max(item_at), "table", name, &TABLES));
+            };
+            for entry in entries(table, item_at) {
+                match name {
+                    "options" => config.options.push(parse_option(&entry)?),
+                    "keys" => keys.push(parse_keys(&entry)?),
+                    _ => {
+                        let (index, rgb) = parse_tone(&entry)?;
+                        let tone = &mut config.preferences.tones[index];
+                        *tone = (rgb, nearest_xterm(rgb), tone.2);
+                    }
+                }
+            }
+        }
+        config.preferences.commands = rebound(&keys);
+        Ok(config)
     }
-    Ok(command)
+
+    /// Returns the command line with the defaults by the file.
+    pub fn command_line(&self) -> Command {
+        let mut command = self.with_defaults(Cli::command());
+        let names: Vec<_> = command.get_subcommands().map(|c| c.get_name().to_string()).collect();
+        for name in names {
+            command = command.mut_subcommand(name, |command| self.with_defaults(command));
+        }
+        command
+    }
+
+    fn with_defaults(&self, command: Command) -> Command {
+        self.options.iter().fold(command, |command, (name, value)| match option(&command, name) {
+            Some(_) => command.mut_arg(name, |arg| arg.default_value(*value)),
+            None => command,
+        })
+    }
+
+    /// Prints the settings in force, as a configuration file.
+    pub fn print(&self) -> Result<(), Failure> {
+        let file = path().map(|path| sanitized(&path.display().to_string())).unwrap_or_default();
+        let mut text =
+            format!("# {file}\n\n# Defaults of options, such as --threads.\n[options]\n");
+        let root = Cli::command();
+        let shipped = |name| {
+            let mut args = commands(&root).filter_map(|command| option(command, name));
+            let value = args.find_map(|arg| arg.get_default_values().first());
+            value.map_or_else(String::new, |value| format!(" {}", value.display()))
+        };
+        for name in OPTIONS {
+            let found = self.options.iter().find(|(known, _)| *known == name);
+            let _ = match found {
+                Some((_, value)) => writeln!(text, "{name} = {}", quoted(value)),
+                None => writeln!(text, "# {name} ={}", shipped(name)),
+            };
+        }
+        text += "\n# Keys of actions in their first place; docs/keys.md has the other places.\n[keys]\n";
+        for command in self.preferences.commands {
+            let (place, keys) = command.keys.first().copied().unwrap_or((KeyContext::Anywhere, ""));
+            let place =
+                if place.place().is_empty() { "" } else { &format!(" # {}", place.place()) };
+            let _ = writeln!(text, "{} = {}{place}", quoted(command.label), quoted(keys));
+        }
+        text += "\n[theme]\n";
+        for (name, ([r, g, b], ..)) in
+            SHIPPED_TONES.map(|(name, _)| name).iter().zip(self.preferences.tones)
+        {
+            let _ = writeln!(text, "{name} = \"#{r:02x}{g:02x}{b:02x}\"");
+        }
+        write_line(std::io::stdout().lock(), text.trim_end())
+    }
+}
+
+/// Cause of an error at the byte offset `at` in the text.
+struct Fault {
+    at: usize,
+    found: String,
+    help: String,
+}
+
+impl Fault {
+    fn new(at: usize, found: String, help: &str) -> Self {
+        Self { at, found, help: help.to_string() }
+    }
+}
+
+/// Key and value of a table, with their byte offsets in the text.
+struct Entry<'a> {
+    key: &'a str,
+    at: usize,
+    item: &'a Item,
+    item_at: usize,
+}
+
+/// Returns the entries of the table at the offset `table_at`.
+fn entries(table: &dyn TableLike, table_at: usize) -> impl Iterator<Item = Entry<'_>> {
+    table.iter().map(move |(key, item)| {
+        let at = table.key(key).and_then(|key| key.span()).map_or(table_at, |span| span.start);
+        Entry { key, at, item, item_at: item.span().map_or(at, |span| span.start) }
+    })
 }
 
 fn option<'a>(command: &'a Command, name: &str) -> Option<&'a Arg> {
@@ -67,62 +173,6 @@ fn option<'a>(command: &'a Command, name: &str) -> Option<&'a Arg> {
 /// Returns the program without a subcommand, and the subcommands.
 fn commands(root: &Command) -> impl Iterator<Item = &Command> {
     std::iter::once(root).chain(root.get_subcommands())
-}
-
-fn with_defaults(command: Command, defaults: &[(&'static str, &'static str)]) -> Command {
-    defaults.iter().fold(command, |command, (name, value)| match option(&command, name) {
-        Some(_) => command.mut_arg(name, |arg| arg.default_value(*value)),
-        None => command,
-    })
-}
-
-/// Cause of an error: byte offset in the text, finding and help.
-type Fault = (usize, String, String);
-
-fn apply(text: &str, path: &Path) -> Result<(), Box<Diagnostic>> {
-    let located = |(at, found, help): Fault| Box::new(Diagnostic::at(path, text, at, found, help));
-    let document = Document::parse(text).map_err(|error| {
-        let at = error.span().map_or(0, |span| span.start);
-        located((at, format!("it is not TOML: {}", error.message()), String::new()))
-    })?;
-    read(document.as_table()).map_err(located)
-}
-
-fn read(root: &Table) -> Result<(), Fault> {
-    const TABLES: [&str; 3] = ["options", "keys", "theme"];
-    for (name, item) in root {
-        let at = root.key(name).and_then(|key| key.span()).map_or(0, |span| span.start);
-        let at_table = item.span().map_or(at, |span| span.start);
-        let Some(table) = item.as_table_like().filter(|_| TABLES.contains(&name)) else {
-            return Err(unknown(at.max(at_table), "table", name, &TABLES));
-        };
-        let mut options = Vec::new();
-        let (mut keys, mut colors) = (Vec::new(), SHIPPED_TONES.map(|(_, tone)| tone));
-        for (key, item) in table.iter() {
-            let at = table.key(key).and_then(|key| key.span()).map_or(at_table, |span| span.start);
-            let value = item.span().map_or(at, |span| span.start);
-            match name {
-                "options" => options.push(read_option((at, key), (value, item))?),
-                "keys" => keys.push(read_keys((at, key), (value, item))?),
-                _ => {
-                    let names = SHIPPED_TONES.map(|(name, _)| name);
-                    let index = names.iter().position(|name| *name == key);
-                    let index = index.ok_or_else(|| unknown(at, "colour", key, &names))?;
-                    let rgb = item.as_str().and_then(rgb_of).ok_or_else(|| {
-                        let help = "Expected a colour such as \"#80a0ff\".".to_string();
-                        (value, format!("{key} is no colour"), help)
-                    })?;
-                    colors[index] = (rgb, nearest_xterm(rgb), colors[index].2);
-                }
-            }
-        }
-        match name {
-            "options" => drop(OPTIONS_SET.set(options)),
-            "keys" => rebind(&keys),
-            _ => set_tones(colors),
-        }
-    }
-    Ok(())
 }
 
 /// Parses a colour such as `#80a0ff`.
@@ -136,16 +186,26 @@ fn unknown(at: usize, what: &str, name: &str, known: &[&str]) -> Fault {
     let help = did_you_mean(name, known.iter().copied());
     let list =
         if known.len() > 12 { String::new() } else { format!("Known: {}.", known.join(", ")) };
-    (at, format!("there is no {what} \"{}\"", sanitized(name)), list + &help)
+    Fault::new(at, format!("there is no {what} \"{}\"", sanitized(name)), &(list + &help))
+}
+
+/// Parses a tone: its index in [`SHIPPED_TONES`], and its colour.
+fn parse_tone(entry: &Entry) -> Result<(usize, [u8; 3]), Fault> {
+    let names = SHIPPED_TONES.map(|(name, _)| name);
+    let index = names.iter().position(|name| *name == entry.key);
+    let index = index.ok_or_else(|| unknown(entry.at, "colour", entry.key, &names))?;
+    let rgb = entry.item.as_str().and_then(rgb_of).ok_or_else(|| {
+        let found = format!("{} is no colour", entry.key);
+        Fault::new(entry.item_at, found, "Expected a colour such as \"#80a0ff\".")
+    })?;
+    Ok((index, rgb))
 }
 
 /// Parses an option, whose value must be valid for each command that has the option.
-fn read_option(
-    (at, name): (usize, &str),
-    (value_at, item): (usize, &Item),
-) -> Result<(&'static str, &'static str), Fault> {
-    let known = OPTIONS.into_iter().find(|known| *known == name);
-    let known = known.ok_or_else(|| unknown(at, "option", name, &OPTIONS))?;
+fn parse_option(entry: &Entry) -> Result<(&'static str, &'static str), Fault> {
+    let name = OPTIONS.into_iter().find(|known| *known == entry.key);
+    let name = name.ok_or_else(|| unknown(entry.at, "option", entry.key, &OPTIONS))?;
+    let item = entry.item;
     let text = item.as_str().map_or_else(|| item.to_string().trim().to_string(), str::to_string);
     let root = Cli::command();
     for arg in commands(&root).filter_map(|command| option(command, name)) {
@@ -155,64 +215,31 @@ fn read_option(
             let message = error.to_string();
             let reason: Vec<_> = message.lines().take_while(|line| !line.is_empty()).collect();
             let reason = reason.join(" ").replace("error: ", "").replace("  ", " ");
-            return Err((value_at, reason, format!("`zerkalo render --help` describes --{name}.")));
+            let help = format!("`zerkalo render --help` describes --{name}.");
+            return Err(Fault::new(entry.item_at, reason, &help));
         }
     }
-    Ok((known, text.leak()))
+    Ok((name, text.leak()))
 }
 
 /// Parses the new keys of a command: its index in the table, and the names of the keys.
-fn read_keys(
-    (at, label): (usize, &str),
-    (value, item): (usize, &Item),
-) -> Result<(usize, String), Fault> {
+fn parse_keys(entry: &Entry) -> Result<(usize, String), Fault> {
+    let label = entry.key;
     let labels: Vec<_> = COMMANDS.iter().map(|command| command.label).collect();
     let index = labels.iter().position(|known| *known == label);
-    let index = index.ok_or_else(|| unknown(at, "action", label, &labels))?;
-    let help = || "Expected names as in `zerkalo config`, such as \"u Ctrl-z\".".to_string();
-    let text = item.as_str();
-    let text =
-        text.ok_or_else(|| (value, format!("the keys of \"{label}\" are no text"), help()))?;
-    let mut names = Vec::new();
-    for name in text.split_whitespace() {
-        let key: Key = name
-            .parse()
-            .map_err(|_| (value, format!("there is no key \"{}\"", sanitized(name)), help()))?;
-        names.push(key.to_string());
-    }
-    Ok((index, names.join(" ")))
-}
-
-/// Prints the settings in force, as a configuration file.
-pub fn run() -> Result<(), Failure> {
-    let set = OPTIONS_SET.get().map_or(&[][..], Vec::as_slice);
-    let file = path().map(|path| sanitized(&path.display().to_string())).unwrap_or_default();
-    let mut text = format!("# {file}\n\n# Defaults of options, such as --threads.\n[options]\n");
-    let root = Cli::command();
-    let shipped = |name| {
-        let mut args = commands(&root).filter_map(|command| option(command, name));
-        let value = args.find_map(|arg| arg.get_default_values().first());
-        value.map_or_else(String::new, |value| format!(" {}", value.display()))
+    let index = index.ok_or_else(|| unknown(entry.at, "action", label, &labels))?;
+    let fault = |found: String| {
+        let help = "Expected names as in `zerkalo config`, such as \"u Ctrl-z\".";
+        Fault::new(entry.item_at, found, help)
     };
-    for name in OPTIONS {
-        let found = set.iter().find(|(known, _)| *known == name);
-        let _ = match found {
-            Some((_, value)) => writeln!(text, "{name} = {}", quoted(value)),
-            None => writeln!(text, "# {name} ={}", shipped(name)),
-        };
-    }
-    text +=
-        "\n# Keys of actions in their first place; docs/keys.md has the other places.\n[keys]\n";
-    for command in table() {
-        let (place, keys) = command.keys.first().copied().unwrap_or((KeyContext::Anywhere, ""));
-        let place = if place.place().is_empty() { "" } else { &format!(" # {}", place.place()) };
-        let _ = writeln!(text, "{} = {}{place}", quoted(command.label), quoted(keys));
-    }
-    text += "\n[theme]\n";
-    for (name, ([r, g, b], ..)) in SHIPPED_TONES.map(|(name, _)| name).iter().zip(tones()) {
-        let _ = writeln!(text, "{name} = \"#{r:02x}{g:02x}{b:02x}\"");
-    }
-    write_line(std::io::stdout().lock(), text.trim_end())
+    let text = entry.item.as_str();
+    let text = text.ok_or_else(|| fault(format!("the keys of \"{label}\" are no text")))?;
+    let names = text.split_whitespace().map(|name| {
+        let key = name.parse::<Key>();
+        let key = key.map_err(|_| fault(format!("there is no key \"{}\"", sanitized(name))))?;
+        Ok(key.to_string())
+    });
+    Ok((index, names.collect::<Result<Vec<_>, Fault>>()?.join(" ")))
 }
 
 fn quoted(text: &str) -> String {

@@ -4,6 +4,7 @@ use crate::command::args::EditArgs;
 use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, is_quiet, print_error, scenes, warn, write_line};
 use crate::dashboard::message::Exported;
+use crate::dashboard::preferences::Preferences;
 use crate::dashboard::run::{Ended, FaultyFile, Setup, run as run_dashboard};
 use crate::dashboard::scene_source::SceneSource;
 use std::env;
@@ -19,9 +20,8 @@ use zerkalo_scene::disk::open_regular;
 use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{Recovery, SceneFile, Tone, state_folder};
 use zerkalo_terminal::Environment;
-use zerkalo_world::Precision;
 
-pub fn run(args: &EditArgs) -> Result<(), Failure> {
+pub fn run(args: &EditArgs, preferences: Preferences) -> Result<(), Failure> {
     let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
     let environment = terminal_environment(&format!(
         "`zerkalo render {scene} -o PICTURE.png` renders without one"
@@ -46,10 +46,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     reporter.mute();
     // A continued render keeps its seed, sampler and precision.
     let (sampling, precision) = match &checkpoint {
-        Some(checkpoint) => {
-            let precision = Precision::from_name(&checkpoint.header.film.precision);
-            (checkpoint.sampling(), precision.unwrap_or_default())
-        }
+        Some(checkpoint) => (checkpoint.sampling(), checkpoint.header.film.precision),
         None => {
             let sampling = SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol };
             (sampling, args.precision.precision)
@@ -64,7 +61,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         state,
         threads: args.compute.threads(),
         options: Options::new(precision, sampling, display),
-        terminal: args.terminal.setup(environment),
+        terminal: args.terminal.setup(environment, preferences),
         trace: args.trace.clone(),
     };
     conclude(&run_dashboard(setup)?, io::stdout().lock())

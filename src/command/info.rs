@@ -69,7 +69,7 @@ fn of_plan(plan: &Plan) -> FileMetadata {
     let each = (total - base_rays) / f64::from(settings.shards);
     let rays = format!("{total:.3e}: base {base_rays:.3e}, each shard about {each:.3e}");
     let sampler = settings.sampler.name();
-    let method = settings_text(sampler, &settings.precision, true, &settings.display);
+    let method = settings_text(sampler, settings.precision, true, &settings.display);
     let entries = [
         ("Source", settings.source.clone()),
         ("Scene hash", settings.scene_hash.clone()),

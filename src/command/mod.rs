@@ -32,6 +32,7 @@ use crate::dashboard::scene_source::{BUILT_IN, SceneSource};
 use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches};
+use config::Config;
 use load_progress::LoadReporter;
 use serde::Serialize;
 use std::ffi::OsString;
@@ -76,7 +77,11 @@ impl<E: Display> From<E> for Failure {
 #[inline(never)]
 pub fn main() -> ExitCode {
     let started = Instant::now();
-    let cli = parse_command_line();
+    let config = Config::read().unwrap_or_else(|error| {
+        warn(&error);
+        std::process::exit(1)
+    });
+    let cli = parse(config.command_line());
     if let (None, Some(scene)) = (&cli.command, &cli.edit.scene)
         && !scene.exists()
         && let (error, true) = unknown_command(&scene.to_string_lossy())
@@ -92,7 +97,7 @@ pub fn main() -> ExitCode {
         Some(Command::Render(args)) => render::run(args, started),
         Some(Command::Plan(args)) => plan::run(args),
         Some(Command::Merge(args)) => merge::run(args),
-        Some(Command::Watch(args)) => watch::run(args),
+        Some(Command::Watch(args)) => watch::run(args, config.preferences),
         Some(Command::Measure(args)) => measure::run(args),
         Some(Command::Check(args)) => check::run(args),
         Some(Command::Info(args)) => info::run(args),
@@ -100,10 +105,10 @@ pub fn main() -> ExitCode {
         Some(Command::Scenes(args)) => scenes::run(args),
         Some(Command::New { file }) => new::run(file),
         Some(Command::Doctor(args)) => doctor::run(*args),
-        Some(Command::Config) => config::run(),
+        Some(Command::Config) => config.print(),
         Some(Command::Completions { shell }) => package_files::print_completions(*shell),
         Some(Command::Man { folder }) => package_files::write_manual(folder),
-        None => edit::run(&cli.edit),
+        None => edit::run(&cli.edit, config.preferences),
     };
     let (status, message) = match result {
         Ok(()) => return ExitCode::SUCCESS,
@@ -116,11 +121,7 @@ pub fn main() -> ExitCode {
 }
 
 /// Parses the command line. Ends the program if it is not valid.
-fn parse_command_line() -> Cli {
-    let mut command = config::command_line().unwrap_or_else(|error| {
-        warn(&error);
-        std::process::exit(1)
-    });
+fn parse(mut command: clap::Command) -> Cli {
     let parsed = command.try_get_matches_from_mut(std::env::args_os());
     parsed.and_then(|matches| Cli::from_arg_matches(&matches)).unwrap_or_else(|error| {
         // In `zerkalo rendr a.toml`, clap takes `rendr` for a scene file and reports an error about

@@ -88,7 +88,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         size: scene.film.size,
         seed: args.compute.seed,
         sampler: args.sampler,
-        precision: state.world.info().precision.to_string(),
+        precision: state.world.info().precision,
         display: args.picture.display(&scene),
         rays_per_pixel: scene.film.rays_per_pixel,
         noise_levels: args.noise,
@@ -188,5 +188,5 @@ fn default_base(plan: &Path) -> PathBuf {
 }
 
 fn settings(noise_levels: f64) -> Settings {
-    Settings::new(true, Stop { noise_levels: Some(noise_levels), ..Stop::default() })
+    Settings::until(Stop { noise_levels: Some(noise_levels), ..Stop::default() })
 }

@@ -25,6 +25,7 @@ use zerkalo_render::{Checkpoint, ErrorTarget, Options, ROUNDING_TO_8_BITS, Regio
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::{self, Claim, WriteError};
 use zerkalo_terminal::Signals;
+use zerkalo_world::Precision;
 
 /// Default noise target: half a quantisation step of an 8-bit file.
 const DEFAULT_NOISE_LEVELS: f64 = 0.5;
@@ -212,7 +213,7 @@ pub type End = Result<StoppedBy, u8>;
 pub struct Rendered {
     pub report: Report,
     pub end: End,
-    pub precision: &'static str,
+    pub precision: Precision,
     /// Upper bounds of the light that the picture loses by each limit of the scene, in sentences.
     pub biased: Vec<String>,
     /// Time from the start of the program to the compilation of the scene.
@@ -416,7 +417,7 @@ fn schedule_settings(args: &RenderArgs, output: &ImageOutput) -> Settings {
         args.error.map(|levels| ErrorTarget { levels, quantization: quantization(args, output) });
     let stop =
         Stop { spp: args.spp, noise_levels, rmse_linear: args.rmse, error, seconds: args.time };
-    Settings { criterion, ..Settings::new(!args.uniform, stop) }
+    Settings { adaptive: !args.uniform, criterion, ..Settings::until(stop) }
 }
 
 /// Formats the result of a render, such as `room.png  640x480  212 spp (32-900)  noise 0.500 8-bit

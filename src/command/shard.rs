@@ -19,7 +19,6 @@ use zerkalo_render::{FileError, Options, RenderState};
 use zerkalo_scene::Document;
 use zerkalo_scene::disk::WriteError;
 use zerkalo_terminal::Signals;
-use zerkalo_world::Precision;
 
 /// Time to the first checkpoint. Each later interval is twice the previous one.
 const FIRST_CHECKPOINT: Duration = Duration::from_secs(5);
@@ -171,9 +170,8 @@ fn start(
     if let Some(acceleration) = args.acceleration {
         scene.trace.acceleration = acceleration;
     }
-    let precision = Precision::from_name(&settings.precision).unwrap_or_default();
     let sampling = SampleSettings { seed: settings.seed, kind: settings.sampler };
-    let options = Options::new(precision, sampling, settings.display);
+    let options = Options::new(settings.precision, sampling, settings.display);
     let mut state = RenderState::new(&Arc::new(scene), &options, None)
         .map_err(|fault| format!("{}: {fault}", args.scene.display()))?;
     let mut rays = 0;

@@ -30,7 +30,7 @@ pub fn json(
         "size": size,
         "seed": args.compute.seed,
         "sampler": args.sampler.name(),
-        "precision": rendered.precision,
+        "precision": rendered.precision.name(),
         "lanes": report.lanes,
         "threads": args.compute.threads(),
         "adaptive": !args.uniform,

@@ -1,6 +1,6 @@
 //! Key hints in the last row of the screen, selected from the command table.
 
-use crate::dashboard::update::commands::{Hint, HintLine, table};
+use crate::dashboard::update::commands::{Command, Hint, HintLine};
 use crate::dashboard::{KeyContext, Model, Overlay, PanelLine};
 use zerkalo_scene::edit::Widget;
 
@@ -29,8 +29,8 @@ fn hint_line(model: &Model) -> Option<HintLine> {
 }
 
 /// Returns the hints for the state `line`, sorted by position.
-fn hints_of(line: HintLine) -> Vec<&'static Hint> {
-    let mut hints: Vec<_> = table()
+fn hints_of(commands: &'static [Command], line: HintLine) -> Vec<&'static Hint> {
+    let mut hints: Vec<_> = commands
         .iter()
         .flat_map(|command| command.hints)
         .filter(|hint| hint.lines.contains(&line))
@@ -41,7 +41,8 @@ fn hints_of(line: HintLine) -> Vec<&'static Hint> {
 
 /// Returns the hints for the model's state, sorted by position.
 pub fn hints(model: &Model) -> Vec<&'static Hint> {
-    hint_line(model).map_or_else(Vec::new, hints_of)
+    let hints = |line| hints_of(model.preferences.commands, line);
+    hint_line(model).map_or_else(Vec::new, hints)
 }
 
 #[cfg(test)]
@@ -65,7 +66,7 @@ mod tests {
                     let has_key =
                         command.keys.iter().any(|(c, _)| context.chain().any(|other| other == *c));
                     assert!(has_key, "{} in {line:?}", command.label);
-                    let same_line = hints_of(*line);
+                    let same_line = hints_of(COMMANDS, *line);
                     let same_place = same_line.iter().filter(|h| h.position == hint.position);
                     assert_eq!(same_place.count(), 1, "{} in {line:?}", command.label);
                 }

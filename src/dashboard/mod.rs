@@ -22,6 +22,7 @@ pub mod overlay;
 pub mod overlay_layout;
 pub mod panel_lines;
 pub mod pictures;
+pub mod preferences;
 pub mod run;
 pub mod scene_source;
 mod search;
@@ -40,5 +41,6 @@ use message::{DisplayChannel, Effect, Exported, Format, Message, OpenedScene, Or
 use model::{Drag, FieldList, Mode, Model, WatchTable, short_name};
 use overlay::{Answer, Form, Overlay, Pick, PickEntry, Prompt, Question, ViewedImage};
 use panel_lines::{FieldLine, ListCursor, OutlineEntry, OutlineLine, PanelLine};
+use preferences::Preferences;
 use scene_source::SceneSource;
 use update::UpdateContext;

@@ -6,7 +6,7 @@ use crate::dashboard::loupe::Loupe;
 use crate::dashboard::pictures::{KeptPicture, Pictures};
 use crate::dashboard::{
     Convergence, DisplayChannel, Editor, Focus, KeyContext, ListCursor, OrphanedEdits, Overlay,
-    SceneSource,
+    Preferences, SceneSource,
 };
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use zerkalo_scene::edit::Target;
 use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{History, Scene, SceneErrors};
 pub use zerkalo_terminal::cells::Colors;
-use zerkalo_terminal::event::Button;
+use zerkalo_terminal::event::{Button, Mouse};
 
 /// Mode of the picture's panel: the effect of arrow keys and drags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -161,6 +161,15 @@ pub struct Drag {
     pub moves: bool,
 }
 
+impl Drag {
+    /// Creates a drag that begins at `mouse`, on nothing that it changes.
+    pub(super) fn new(button: Button, Mouse { column, row, modified, .. }: Mouse) -> Self {
+        let last = [column, row];
+        let (moved, in_picture, on_number, moves) = (false, false, false, false);
+        Self { button, modified, last, moved, in_picture, on_number, moves }
+    }
+}
+
 /// View that is not the camera of the scene.
 #[derive(Clone, Debug)]
 pub struct FreeView {
@@ -175,6 +184,7 @@ pub struct FreeView {
 pub struct Model {
     pub screen: [u16; 2],
     pub colors: Colors,
+    pub preferences: Preferences,
     /// `true` if the terminal is known to have a light background.
     pub on_light: bool,
     pub file: File,

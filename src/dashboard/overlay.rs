@@ -92,7 +92,7 @@ pub struct Form {
     pub title: String,
     /// Valid scene that includes the new object or light.
     pub scene: Arc<Scene>,
-    pub subject: Target,
+    pub target: Target,
     /// Label of the undo step.
     pub label: String,
     /// State of the list, whose lines are those of `panel_lines::form`.

@@ -6,7 +6,7 @@ use crate::dashboard::{FieldList, Form, Model, Overlay};
 use std::collections::BTreeSet;
 use std::iter::successors;
 use zerkalo_scene::Scene;
-use zerkalo_scene::edit::{Property, Target, Widget, outline as subjects, rows};
+use zerkalo_scene::edit::{Property, Target, Widget, outline as targets, rows};
 use zerkalo_scene::value::truncated;
 
 /// Cursor of a list.
@@ -56,7 +56,7 @@ pub type PanelLine = ListLine<Box<FieldLine>>;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutlineEntry {
-    pub subject: Target,
+    pub target: Target,
     /// Name with control characters escaped.
     pub label: String,
     /// Number of compounds that have the part.
@@ -72,7 +72,7 @@ pub struct OutlineEntry {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FieldLine {
     /// Part of the scene that has the property.
-    pub subject: Target,
+    pub target: Target,
     pub property: Property,
     /// Index of the number that the line shows; `None` unless the value is a list of numbers.
     pub component: Option<usize>,
@@ -118,7 +118,7 @@ impl FieldLine {
     pub fn is_same(&self, other: &Self) -> bool {
         let id = |line: &Self| (line.act, line.component);
         id(self) == id(other)
-            && self.subject == other.subject
+            && self.target == other.target
             && self.property.key == other.property.key
     }
 }
@@ -142,8 +142,8 @@ pub fn outline(scene: &Scene, unfolded: &BTreeSet<Target>) -> Vec<OutlineLine> {
     let mut lines = Vec::new();
     let mut last = None;
     let mut views = 0;
-    for (section, subject) in subjects(scene) {
-        let compounds: Vec<_> = successors(subject.compound(), Target::compound).collect();
+    for (section, target) in targets(scene) {
+        let compounds: Vec<_> = successors(target.compound(), Target::compound).collect();
         if !compounds.iter().all(|compound| unfolded.contains(compound)) {
             continue;
         }
@@ -151,20 +151,20 @@ pub fn outline(scene: &Scene, unfolded: &BTreeSet<Target>) -> Vec<OutlineLine> {
             lines.push(OutlineLine::Heading(section.title().to_string()));
             last = Some(section);
         }
-        let note = match &subject {
+        let note = match &target {
             Target::View(_) => {
                 views += 1;
                 if views <= 9 { format!("key {views}") } else { String::new() }
             }
             Target::Light(i) if !scene.lights[*i].on => "off".to_string(),
-            Target::Object(_) | Target::Part(..) => own_material(scene, &subject),
+            Target::Object(_) | Target::Part(..) => own_material(scene, &target),
             _ => String::new(),
         };
-        let label = subject.label(scene);
-        let is_compound = !subject.parts(scene).is_empty();
-        let is_unfolded = is_compound.then(|| unfolded.contains(&subject));
+        let label = target.label(scene);
+        let is_compound = !target.parts(scene).is_empty();
+        let is_unfolded = is_compound.then(|| unfolded.contains(&target));
         lines.push(OutlineLine::Entry(OutlineEntry {
-            subject,
+            target,
             label,
             depth: compounds.len(),
             unfolded: is_unfolded,
@@ -175,22 +175,22 @@ pub fn outline(scene: &Scene, unfolded: &BTreeSet<Target>) -> Vec<OutlineLine> {
 }
 
 /// Returns the name of the material of an object or part; empty if it is that of its compound.
-fn own_material(scene: &Scene, subject: &Target) -> String {
+fn own_material(scene: &Scene, target: &Target) -> String {
     let of = |target: &Target| target.material(scene).map(|material| material.label(scene));
-    let whole = subject.compound().and_then(|compound| of(&compound));
-    of(subject).filter(|own| whole.as_ref() != Some(own)).unwrap_or_default()
+    let whole = target.compound().and_then(|compound| of(&compound));
+    of(target).filter(|own| whole.as_ref() != Some(own)).unwrap_or_default()
 }
 
-/// Returns the index of the line that selects `subject`.
-pub fn outline_position(lines: &[OutlineLine], subject: &Target) -> Option<usize> {
-    let selects = |line: &OutlineLine| line.entry().is_some_and(|entry| entry.subject == *subject);
+/// Returns the index of the line that selects `target`.
+pub fn outline_position(lines: &[OutlineLine], target: &Target) -> Option<usize> {
+    let selects = |line: &OutlineLine| line.entry().is_some_and(|entry| entry.target == *target);
     lines.iter().position(selects)
 }
 
-/// Returns the lines of the inspector: the properties of `subject`, and those of its material.
-pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
-    let mut lines = fields(scene, subject);
-    let material = subject.material(scene).filter(|material| material != subject);
+/// Returns the lines of the inspector: the properties of `target`, and those of its material.
+pub fn inspector(scene: &Scene, target: &Target) -> Vec<PanelLine> {
+    let mut lines = fields(scene, target);
+    let material = target.material(scene).filter(|material| material != target);
     if let Some(Target::Material(name)) = &material {
         let users = scene.objects.iter().filter(|o| o.names_material(name)).count();
         let shared = if users > 1 { format!(" · shared by {users}") } else { String::new() };
@@ -203,7 +203,7 @@ pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
 /// Returns the lines of a form: the properties of the new object or light, and those of its
 /// material if that is not in `base`, the scene before the form was opened.
 pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
-    let has_new_material = match form.subject.material(&form.scene) {
+    let has_new_material = match form.target.material(&form.scene) {
         Some(Target::Material(name)) => !base.materials.contains_key(&name),
         _ => false,
     };
@@ -212,22 +212,22 @@ pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
         FieldLine { act: RowAct::Add, label: format!("✓ Add {what}"), ..FieldLine::default() };
     let mut lines = vec![PanelLine::Entry(Box::new(add))];
     lines.extend(match has_new_material {
-        true => inspector(&form.scene, &form.subject),
-        false => fields(&form.scene, &form.subject),
+        true => inspector(&form.scene, &form.target),
+        false => fields(&form.scene, &form.target),
     });
     lines
 }
 
-fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
-    // A `subject` that no longer exists has no fields.
-    let mut rows = rows(scene, subject).unwrap_or_default();
+fn fields(scene: &Scene, target: &Target) -> Vec<PanelLine> {
+    // A `target` that no longer exists has no fields.
+    let mut rows = rows(scene, target).unwrap_or_default();
     // The outline has the parts of compounds.
     rows.retain(|row| !row.key.ends_with(".of"));
-    if let Target::Material(_) = subject {
+    if let Target::Material(_) = target {
         rows.sort_by_key(|row| common(row).unwrap_or(COMMON.len()));
     }
     rows.into_iter()
-        .flat_map(|property| lines_of(subject, property))
+        .flat_map(|property| lines_of(target, property))
         .map(|f| PanelLine::Entry(Box::new(f)))
         .collect()
 }
@@ -255,17 +255,17 @@ fn visible(lines: Vec<PanelLine>, list: &FieldList) -> Vec<PanelLine> {
     lines
 }
 
-/// Returns the lines of `property` of `subject`: one for each number if the value is a list of
+/// Returns the lines of `property` of `target`: one for each number if the value is a list of
 /// numbers, otherwise a single one.
-fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
+fn lines_of(target: &Target, property: Property) -> Vec<FieldLine> {
     let line = |component: Option<usize>, label: String, value: &str| FieldLine {
-        subject: subject.clone(),
+        target: target.clone(),
         property: property.clone(),
         component,
         label,
         value: zerkalo_scene::value::sanitized(value),
         swatch: property.color.filter(|_| component.unwrap_or(0) == 0),
-        is_rare: matches!(subject, Target::Material(_))
+        is_rare: matches!(target, Target::Material(_))
             && property.is_default
             && common(&property).is_none(),
         act: RowAct::Edit,
@@ -334,10 +334,10 @@ mod tests {
         scene.cameras.insert("left".into(), scene.camera.clone());
         scene.lights[0].on = false;
         let lines = outline(&scene, &BTreeSet::new());
-        for (_, subject) in subjects(&scene) {
-            assert!(outline_position(&lines, &subject).is_some(), "{subject:?}");
-            let fields = inspector(&scene, &subject);
-            assert!(!fields.is_empty(), "{subject:?}");
+        for (_, target) in targets(&scene) {
+            assert!(outline_position(&lines, &target).is_some(), "{target:?}");
+            let fields = inspector(&scene, &target);
+            assert!(!fields.is_empty(), "{target:?}");
         }
         let notes: Vec<_> = lines
             .iter()

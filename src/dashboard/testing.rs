@@ -4,6 +4,7 @@ use zerkalo_render::film::{ByMeasure, Noise};
 use zerkalo_render::schedule::Spp;
 use zerkalo_render::session::{QUALITIES, Report, State};
 use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 /// Text of the scene that `zerkalo new` writes.
 pub const STARTER: &str = include_str!("../command/starter.toml");
@@ -43,7 +44,7 @@ pub fn report(generation: u64, spp: u64, noise_levels: Option<f64>) -> Report {
         saturated_pixels: 0,
         recent_samples_per_second: 1e7,
         threads: 2,
-        precision: "single",
+        precision: Some(Precision::Single),
         lanes: "f32x8",
         inventory: "1 sphere (list)".into(),
     }

@@ -155,7 +155,7 @@ impl Variant {
     /// Starts the render of this variant. It ends by itself only when every tile has its largest
     /// number of samples. Fails if a thread cannot be started.
     pub fn start(&self) -> io::Result<SyncRender> {
-        let settings = Settings::new(self.adaptive, Stop::default());
+        let settings = Settings { adaptive: self.adaptive, ..Settings::until(Stop::default()) };
         SyncRender::new(&self.scene, &self.options, settings, self.threads)
     }
 

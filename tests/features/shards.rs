@@ -34,7 +34,7 @@ fn plan(film: &Film, shards: u32) -> Plan {
             size: SIZE,
             seed: SEED,
             sampler: SamplerKind::Sobol,
-            precision: film.header.precision.clone(),
+            precision: film.header.precision,
             display: Display::default(),
             rays_per_pixel: 0,
             noise_levels: 1.0,

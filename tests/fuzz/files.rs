@@ -269,7 +269,7 @@ pub fn plan() -> Vec<Vec<u8>> {
             size: [40, 20],
             seed: 3,
             sampler: SamplerKind::Sobol,
-            precision: "single".into(),
+            precision: zerkalo_world::Precision::Single,
             display: Display::default(),
             rays_per_pixel: 0,
             noise_levels: 0.25,

@@ -5,9 +5,9 @@ use zerkalo::dashboard::layout::Focus;
 
 const BALL: Target = Target::Object(1);
 
-fn desk(subject: Target, keys: &str) -> Desk {
+fn desk(target: Target, keys: &str) -> Desk {
     let mut desk = Desk::new(ROOM);
-    desk.select(subject);
+    desk.select(target);
     desk.keys(keys);
     desk
 }

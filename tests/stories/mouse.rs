@@ -121,7 +121,7 @@ fn click_selects_lines_of_outline_and_inspector() {
         }
         desk.click(rows.x + 2, rows.y + i as u16);
         if let Some(entry) = line.entry() {
-            assert_eq!(desk.model.selection, entry.subject);
+            assert_eq!(desk.model.selection, entry.target);
         }
     }
     desk.select(Target::Object(1));

@@ -32,7 +32,7 @@ fn keys() -> Vec<Key> {
 }
 
 fn quits(desk: &Desk, key: Key) -> bool {
-    lookup(desk.model.context(), key).is_some_and(|c| c.label == QUIT)
+    lookup(COMMANDS, desk.model.context(), key).is_some_and(|c| c.label == QUIT)
         || key.code == Code::Enter
             && (desk.picked_command() == Some(QUIT)
                 || desk.editor().is_some_and(|e| ["q", "wq", "q!"].contains(&e.text())))

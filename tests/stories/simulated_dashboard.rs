@@ -6,6 +6,7 @@ use zerkalo::dashboard::editor::Editor;
 use zerkalo::dashboard::pictures::KeptPicture;
 use zerkalo::dashboard::scene_source::{NEW, SceneSource};
 use zerkalo_render::film::LinearImage;
+use zerkalo_world::Precision;
 
 /// Path of the scene file.
 pub const FILE: &str = "room.toml";
@@ -122,9 +123,9 @@ impl Desk {
         self.model.seen()
     }
 
-    pub fn select(&mut self, subject: Target) {
-        assert!(subject.exists(self.scene()), "{subject:?}");
-        self.model.selection = subject;
+    pub fn select(&mut self, target: Target) {
+        assert!(target.exists(self.scene()), "{target:?}");
+        self.model.selection = target;
     }
 
     /// Sends a message to the dashboard and answers the effects that it requests.
@@ -202,7 +203,7 @@ impl Desk {
                     height: 48,
                     scales: vec![1.0],
                     seed: 0,
-                    precision: "f32".into(),
+                    precision: Precision::Single,
                 };
                 let mix = LightWeights { weights: vec![[1.0; 3]] };
                 Message::Pinned(KeptPicture {
@@ -234,7 +235,7 @@ impl Desk {
         if types && self.model.overlay.is_some() {
             return Vec::new();
         }
-        let command = lookup(self.model.context(), key);
+        let command = lookup(COMMANDS, self.model.context(), key);
         let mut fired: Vec<_> = command.map(|command| command.label).into_iter().collect();
         if key.code == Code::Enter {
             fired.extend(self.picked_command());

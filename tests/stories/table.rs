@@ -13,7 +13,7 @@ fn every_key_runs_one_command_per_context() {
                 if let Some(other) = seen.insert((*context, key), command.label) {
                     panic!("{name} in {context:?} is both {other:?} and {:?}", command.label);
                 }
-                let found = lookup(*context, key).map(|found| found.label);
+                let found = lookup(COMMANDS, *context, key).map(|found| found.label);
                 assert_eq!(found, Some(command.label), "{name} in {context:?}");
             }
         }

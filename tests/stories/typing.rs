@@ -31,14 +31,14 @@ fn stray_keys_change_nothing_on_any_row() {
     let room = Desk::new(ROOM);
     let parts = zerkalo_scene::edit::outline(room.scene());
     let mut seen = HashSet::new();
-    for (_, subject) in parts {
+    for (_, target) in parts {
         let mut desk = Desk::new(ROOM);
-        desk.select(subject.clone());
+        desk.select(target.clone());
         desk.keys("Tab");
         unchanged(&mut desk, "the outline", &STRAY);
         for line in 0..usize::MAX {
             let mut desk = Desk::new(ROOM);
-            desk.select(subject.clone());
+            desk.select(target.clone());
             desk.keys("Tab Enter");
             if line >= desk.model.field_lines().len() {
                 break;
@@ -50,7 +50,7 @@ fn stray_keys_change_nothing_on_any_row() {
                 continue;
             }
             desk.model.inspector.cursor = line;
-            unchanged(&mut desk, &format!("line {line} of {subject:?}"), &STRAY);
+            unchanged(&mut desk, &format!("line {line} of {target:?}"), &STRAY);
         }
     }
 }

@@ -160,15 +160,15 @@ impl Checkpoint {
         let mut options = options.clone();
         // A render that has changed to double precision stays in it.
         if options.world.precision == Precision::Auto {
-            let precision = Precision::from_name(&self.header.film.precision);
-            options.world.precision = precision.unwrap_or(Precision::Auto);
+            options.world.precision = self.header.film.precision;
         }
         let mut state = RenderState::new(&compiled, &options, None)
             .map_err(|fault| self.error(fault, "correct the scene"))?;
         let (ours, theirs) = (&state.film.header, &self.header.film);
         if ours.precision != theirs.precision {
-            let what = format!("its precision is {}, not {}", theirs.precision, ours.precision);
-            return Err(self.error(what, &format!("add --precision {}", theirs.precision)));
+            let [ours, theirs] = [ours, theirs].map(|header| header.precision.name());
+            let what = format!("its precision is {theirs}, not {ours}");
+            return Err(self.error(what, &format!("add --precision {theirs}")));
         }
         state.film.check_header(theirs).map_err(|what| self.error(what, foreign))?;
         if !same && !state.try_reuse(scene) {

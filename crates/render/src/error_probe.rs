@@ -133,7 +133,9 @@ type Pair = [[f64; 3]; 2];
 /// Pixels of a tile that a packet probes.
 struct Packet {
     tile: usize,
-    rectangle: ([usize; 2], [usize; 2]),
+    /// Upper left corner of the tile in the picture.
+    origin: [usize; 2],
+    extent: [usize; 2],
     /// Columns and rows in the picture.
     pixels: Vec<(u32, u32)>,
 }
@@ -154,7 +156,7 @@ impl Packet {
             ((origin[0] + column) as u32, (origin[1] + row) as u32)
         };
         let pixels = (0..extent[1]).map(pixel).collect();
-        Some(Self { tile, rectangle: (origin, extent), pixels })
+        Some(Self { tile, origin, extent, pixels })
     }
 
     /// Traces the first sample of each replicate in each pixel. Returns the number of rays as well.
@@ -166,7 +168,8 @@ impl Packet {
         let (mut pairs, mut rays) = (vec![Pair::default(); self.pixels.len()], 0);
         for replicate in [0, 1] {
             let pixels = self.pixels.iter().copied();
-            let Some(mut tile) = tracer.tile(replicate, self.rectangle, pixels) else { continue };
+            let tile = tracer.tile(replicate, self.origin, self.extent, pixels);
+            let Some(mut tile) = tile else { continue };
             tile.radiance_shared::<1>(0, |packet, radiance| {
                 for (lane, pixel) in packet.enumerate() {
                     pairs[pixel][replicate] = radiance_of(radiance, lane, weights);
@@ -277,7 +280,7 @@ impl RenderState {
         };
         for (i, packet) in packets.iter().enumerate() {
             let tile = film.tile(packet.tile)?;
-            let ([x, y], _) = packet.rectangle;
+            let [x, y] = packet.origin;
             for (j, pixel) in packet.pixels.iter().enumerate() {
                 let number = (pixel.1 as usize - y) * TILE + pixel.0 as usize - x;
                 let pixel = tile.sums(number);
@@ -316,7 +319,8 @@ mod tests {
         let sampling = SampleSettings { seed: 0, kind: SamplerKind::Sobol };
         let options = Options::new(precision, sampling, Display::default());
         let stop = Stop { spp: Some(32), ..Stop::default() };
-        let mut render = SyncRender::new(scene, &options, Settings::new(false, stop), 2).unwrap();
+        let settings = Settings { adaptive: false, ..Settings::until(stop) };
+        let mut render = SyncRender::new(scene, &options, settings, 2).unwrap();
         while render.step().is_none() {}
         let RenderState { film, weights, .. } = &render.state;
         let rows = (0..film.header.height).flat_map(|y| film.row(y, Replicates::Both, weights));

@@ -8,6 +8,7 @@ use crate::session::Report;
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_scene::value::Fnv1a64;
 use zerkalo_scene::{Scene, Tone};
+use zerkalo_world::Precision;
 
 /// Origin of a picture: the part of its metadata that is not in its [`RenderState`].
 #[derive(Clone, Debug, PartialEq)]
@@ -64,17 +65,22 @@ pub fn metadata(
         ("Camera", state.scene().camera.to_inline_table()),
         ("Seed", header.seed.to_string()),
     ];
-    let settings = settings_text(sampler, &header.precision, adaptive, &state.display());
+    let settings = settings_text(sampler, header.precision, adaptive, &state.display());
     let method = [("Biased", biased), (SETTINGS, settings)];
     let entries = origin.into_iter().chain(film_entries(report)).chain(method);
     entries.map(|(key, value)| (key.to_string(), value)).collect()
 }
 
 /// Formats the value of the metadata entry `Settings`.
-pub fn settings_text(sampler: &str, precision: &str, adaptive: bool, display: &Display) -> String {
+pub fn settings_text(
+    sampler: &str,
+    precision: Precision,
+    adaptive: bool,
+    display: &Display,
+) -> String {
     let allocation = if adaptive { "adaptive" } else { "uniform" };
     let display = display_text(display);
-    format!("sampler {sampler}, {precision} precision, {allocation}{display}")
+    format!("sampler {sampler}, {} precision, {allocation}{display}", precision.name())
 }
 
 fn display_text(display: &Display) -> String {

@@ -109,9 +109,9 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
         } else {
             for (tile, counts) in tiles.chunks_mut(1).zip(counts.chunks_mut(1)) {
                 let pixels = pixels_to_add(tile, steps);
-                let rectangle = (tile[0].0, tile[0].1.extent);
+                let (origin, extent) = (tile[0].0, tile[0].1.extent);
                 let positions = pixels.iter().map(|p| p.position);
-                if let Some(tracer) = self.tracer.tile(0, rectangle, positions) {
+                if let Some(tracer) = self.tracer.tile(0, origin, extent, positions) {
                     self.add_pixels(tile, tracer, &pixels, counts);
                 }
             }

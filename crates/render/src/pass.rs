@@ -110,7 +110,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
             ((origin[0] + pixel % TILE) as u32, (origin[1] + pixel / TILE) as u32)
         };
         let positions = pixels.iter().map(position);
-        let Some(mut tracer) = self.tracer.tile(replicate, (origin, tile.extent), positions) else {
+        let Some(mut tracer) = self.tracer.tile(replicate, origin, tile.extent, positions) else {
             tile.advance(replicate, job.count);
             return Counts::default();
         };
@@ -270,6 +270,7 @@ mod tests {
     use crate::film::testing::TestFilm;
     use zerkalo_kernel::lanes::{Float, Single};
     use zerkalo_kernel::sampling::SamplerKind;
+    use zerkalo_world::Precision;
 
     /// Checks that invalid samples are counted and stored as black, and that samples above the
     /// largest value of the film are stored as this value. The sums of other light groups are not
@@ -295,7 +296,7 @@ mod tests {
             (f64::INFINITY, limit),
             (1e30, limit),
         ] {
-            let (scales, precision) = (world.info.scales.clone(), "single".to_string());
+            let (scales, precision) = (world.info.scales.clone(), Precision::Single);
             let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
             let tile = film.slots(&[0]).remove(0).prepare();
             let mut faults = Vec::new();

@@ -96,7 +96,7 @@ impl RenderState {
             height,
             scales: world.info().scales.clone(),
             seed: options.sampling.seed,
-            precision: world.info().precision.to_string(),
+            precision: world.info().precision,
         };
         let weights = LightWeights { weights: world.info().groups.weights(&scene) };
         let estimator = Estimator::new(&header.scales, &weights, &options.display);

@@ -15,8 +15,9 @@ pub struct SceneFile {
     path: Option<PathBuf>,
     /// Scene and its text, as last read or saved.
     pub document: Document,
-    /// Hash of the bytes that this program last read from or wrote to the file.
-    fingerprint: u64,
+    /// Hash of the bytes that this program last read from or wrote to the file; `None` if there is no
+    /// file, or it has not been readable.
+    fingerprint: Option<u64>,
 }
 
 /// State of a scene file on disk, compared with the bytes that this program last read or wrote.
@@ -77,20 +78,20 @@ impl SceneFile {
     /// Reads a scene like [`SceneFile::open`], with a cache of the files that it refers to.
     pub fn open_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         let document = Document::read_opened(path, open_regular(path), assets)?;
-        let fingerprint = fnv1a64(document.text().as_bytes());
+        let fingerprint = Some(fnv1a64(document.text().as_bytes()));
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
 
     /// Creates a scene without a file. `name` is the file name in diagnostics.
     pub fn untitled(text: String, name: &str) -> Result<Self, SceneErrors> {
-        Ok(Self { path: None, document: Document::parse(text, name)?, fingerprint: 0 })
+        Ok(Self { path: None, document: Document::parse(text, name)?, fingerprint: None })
     }
 
     /// Creates a scene from `text`: unsaved edits of the scene file at `path`. The file stays as it
     /// is until the scene is saved.
     pub fn recovered(path: &Path, text: String) -> Result<Self, SceneErrors> {
         let document = Document::parse(text, &path.display().to_string())?;
-        let fingerprint = content(path).ok().flatten().unwrap_or_default();
+        let fingerprint = content(path).ok().flatten();
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
 
@@ -99,16 +100,16 @@ impl SceneFile {
         Scene::parse_in(text, name, self.document.scene().resolver.clone())
     }
 
-    /// Returns the hash of the bytes last read or written; `None` if the scene has no file.
+    /// Returns the hash of the bytes last read or written; `None` if there are none.
     pub fn fingerprint(&self) -> Option<u64> {
-        self.path.as_ref().map(|_| self.fingerprint)
+        self.fingerprint
     }
 
     /// Returns `true` if `text` is what was last read or written. In a scene without a file, this
     /// is the text from which the scene was created.
     pub fn holds(&self, text: &str) -> bool {
         match self.path {
-            Some(_) => fnv1a64(text.as_bytes()) == self.fingerprint,
+            Some(_) => self.fingerprint == Some(fnv1a64(text.as_bytes())),
             None => text == self.document.text(),
         }
     }
@@ -136,8 +137,8 @@ impl SceneFile {
 
     fn state_of(&self, found: &io::Result<Option<u64>>) -> DiskState {
         match found {
-            Ok(Some(found)) if *found == self.fingerprint => DiskState::Unchanged,
             Ok(None) => DiskState::Missing,
+            Ok(found) if *found == self.fingerprint => DiskState::Unchanged,
             _ => DiskState::Changed,
         }
     }
@@ -146,7 +147,7 @@ impl SceneFile {
     /// file is reported once.
     pub fn reload(&mut self) -> Result<(), SceneErrors> {
         let Some(path) = self.path.clone() else { return Ok(()) };
-        if let Ok(Some(found)) = content(&path) {
+        if let Ok(found @ Some(_)) = content(&path) {
             self.fingerprint = found;
         }
         *self = Self::open_with(&path, self.document.scene().resolver.assets.clone())?;
@@ -213,7 +214,7 @@ impl SceneFile {
                 what: sanitized(&format!("{what}; {remedy}")),
             },
         })?;
-        self.fingerprint = fnv1a64(text);
+        self.fingerprint = Some(fnv1a64(text));
         self.document = document;
         Ok(())
     }

@@ -4,7 +4,7 @@ use crate::analysis::precision::single_suffices;
 use crate::compile::RecenteredGeometry;
 use crate::integrator::first_hit::FirstHit;
 use crate::world::{World, WorldInfo};
-use zerkalo_kernel::lanes::{Double, Single};
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
 use zerkalo_scene::Scene;
 
 /// Floating-point precision in which a scene is rendered.
@@ -20,13 +20,23 @@ pub enum Precision {
 }
 
 impl Precision {
+    /// Returns the precision of the numbers in `L`.
+    pub(crate) fn of<L: SimdFloat>() -> Self {
+        if size_of::<L::Scalar>() == size_of::<f32>() { Self::Single } else { Self::Double }
+    }
+
+    /// Returns the name in film and plan files and in printed results. It never changes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Double => "double",
+            Self::Auto => "auto",
+        }
+    }
+
     /// Returns the precision that film and plan files call `name`.
     pub fn from_name(name: &str) -> Option<Self> {
-        match name {
-            "single" => Some(Self::Single),
-            "double" => Some(Self::Double),
-            _ => None,
-        }
+        [Self::Single, Self::Double].into_iter().find(|precision| precision.name() == name)
     }
 }
 

@@ -4,6 +4,7 @@
 use crate::analysis::inventory::inventory;
 use crate::analysis::radiance_range::SceneDistances;
 use crate::analysis::truncation_bias::{left_out, truncation_bounds};
+use crate::any_world::Precision;
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::culling::tile::{Culling, CullingMode, FrustumCuller, LightBounds, TileCandidates};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
@@ -494,7 +495,7 @@ impl<L: SimdFloat> World<L> {
             info: WorldInfo {
                 groups,
                 scales,
-                precision: if L::EPSILON > 1e-10 { "single" } else { "double" },
+                precision: Precision::of::<L>(),
                 lanes: L::NAME,
                 light_period: lights.choice.as_ref().map_or(1, |choice| choice.sets as u32),
                 inventory: String::new(),

@@ -31,7 +31,8 @@ impl<L: SimdFloat> CameraTracer<'_, L> {
     pub fn tile(
         &self,
         replicate: usize,
-        (origin, extent): ([usize; 2], [usize; 2]),
+        origin: [usize; 2],
+        extent: [usize; 2],
         pixels: impl Iterator<Item = (u32, u32)>,
     ) -> Option<TileTracer<'_, L>> {
         let World { culling, geometry, camera, .. } = self.world;

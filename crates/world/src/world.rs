@@ -1,5 +1,6 @@
 //! `World`: a compiled scene, as the integrators read it.
 
+use crate::any_world::Precision;
 use crate::compile::CompiledLights;
 use crate::culling::tile::{Culling, TileCandidates};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
@@ -111,8 +112,8 @@ pub struct WorldInfo {
     /// Scale of each light group: the number of integer steps per unit of radiance in the film, a
     /// power of two.
     pub scales: Vec<f64>,
-    /// Name of the precision: `single` or `double`.
-    pub precision: &'static str,
+    /// Precision of the SIMD type, single or double.
+    pub precision: Precision,
     /// Name of the SIMD type, such as `f32x8`.
     pub lanes: &'static str,
     /// Number of successive samples of a pixel that together trace a shadow ray to each light once;

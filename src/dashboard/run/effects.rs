@@ -50,7 +50,7 @@ impl EffectRunner {
         options: Options,
         results: Sender<Message>,
     ) -> io::Result<Self> {
-        let session = Session::new(threads, options.clone(), Settings::new(true, DEFAULT_STOP))?;
+        let session = Session::new(threads, options.clone(), Settings::until(DEFAULT_STOP))?;
         let files = Files::new(file, state, results.clone())?;
         let exporter =
             Exporter { file: Some(files.shared.clone()), sampler: options.sampling.kind };
@@ -98,7 +98,7 @@ impl EffectRunner {
             Effect::Copy(path) => frames.copy(&paths::full(&path)),
             Effect::ViewImage { path, display, screen, downloads } => {
                 let viewport = image_viewer::viewport(frames, screen);
-                image_viewer::prepare(path, display, (viewport, downloads), self.results.clone());
+                image_viewer::prepare(path, display, viewport, downloads, self.results.clone());
             }
             Effect::Save { scene, path, overwrite } => {
                 self.edit(|editing| editing.files.save(scene, path, overwrite));
@@ -137,7 +137,7 @@ impl EffectRunner {
     fn export_sized(&mut self, scene: Arc<Scene>, format: Format, display: Display, stop: Stop) {
         let Some(editing) = &mut self.editing else { return };
         let options = Options { display, ..editing.options.clone() };
-        let settings = Settings::new(true, stop);
+        let settings = Settings::until(stop);
         let started = Session::new(editing.threads, options, settings).and_then(|mut session| {
             session.set_scene(scene);
             ResizedExport::start(session, format, self.exporter.clone(), self.results.clone())

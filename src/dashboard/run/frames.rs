@@ -363,7 +363,7 @@ impl FramePipeline {
         self.target.reset();
         self.cursor = self.view.draw(model, &mut self.target);
         let View { place, uncovered, .. } = &mut self.view;
-        let removal = self.tiles.update(model, &self.target, (*place, &uncovered[..]));
+        let removal = self.tiles.update(model, &self.target, *place, uncovered);
         self.removal.extend(removal.as_bytes());
         self.tiles.paint(&mut self.target, *place, uncovered);
         self.link[0] = self.link_to_export(model);

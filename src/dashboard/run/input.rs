@@ -2,9 +2,8 @@
 
 use crate::dashboard::Message;
 use crossbeam_channel::{Receiver, unbounded};
-use std::io;
-use std::thread;
 use std::time::Instant;
+use std::{io, thread};
 use zerkalo_terminal::event::{Mouse, MouseKind};
 use zerkalo_terminal::{InputReader, TimedEvent};
 

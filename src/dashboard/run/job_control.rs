@@ -4,10 +4,9 @@ use crate::dashboard::Message;
 use crate::dashboard::run::event_loop::Dashboard;
 use crossbeam_channel::Receiver;
 use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};
-use std::io;
 use std::sync::Arc;
-use std::thread;
 use std::time::Duration;
+use std::{io, thread};
 use zerkalo_terminal::{
     HUNG_UP, SignalEvent, SignalQueue, Signals, TimedEvent, Tty, cell_px, size,
 };

@@ -15,7 +15,7 @@ mod writer;
 
 use crate::dashboard::graphics::Graphics;
 use crate::dashboard::scene_source::is_new;
-use crate::dashboard::{Exported, Message, Model};
+use crate::dashboard::{Exported, Message, Model, Preferences};
 use crossbeam_channel::{Receiver, unbounded};
 use effects::EffectRunner;
 use event_loop::Dashboard;
@@ -69,6 +69,7 @@ pub struct TerminalSetup {
     pub graphics: GraphicsMode,
     /// Fixed rate of output in bytes per second; `None` to adapt it to the connection.
     pub bandwidth: Option<f64>,
+    pub preferences: Preferences,
 }
 
 /// Result of a dashboard after it has ended.
@@ -130,7 +131,7 @@ fn run_on_terminal(
     terminal: TerminalSetup,
     trace: Option<PathBuf>,
 ) -> io::Result<Ended> {
-    let TerminalSetup { colors, environment, graphics, bandwidth } = terminal;
+    let TerminalSetup { colors, environment, graphics, bandwidth, preferences } = terminal;
     let signals = SignalQueue::of_terminal()?;
     let screen = Screen::enter()?;
     let signals = handle_signals(signals, screen.tty.clone(), PATIENCE)?;
@@ -142,6 +143,7 @@ fn run_on_terminal(
         return Ok(Ended { signalled: Some(HUNG_UP), exported: Vec::new(), kept: Ok(None) });
     };
     model.screen = screen_size;
+    model.preferences = preferences;
     model.colors = colors.unwrap_or(terminal.colors);
     terminal.cell_px = cell_px().or(terminal.cell_px);
     model.graphics = Graphics::new(terminal.clone(), graphics);

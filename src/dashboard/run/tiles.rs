@@ -57,10 +57,16 @@ pub struct PanelTiles {
 }
 
 impl PanelTiles {
-    /// Fits the tiles to a new frame of `model`. `target` has its cells, and `picture` is the area of
-    /// its picture with the mask of the cells that nothing covers. Returns the sequence that removes
+    /// Fits the tiles to a new frame of `model`. `target` has its cells, `picture` is the area of
+    /// its picture, and `uncovered` the mask of the cells there that nothing covers. Returns the sequence that removes
     /// tiles which may no longer be visible.
-    pub fn update(&mut self, model: &Model, target: &Buffer, picture: (Rect, &[bool])) -> String {
+    pub fn update(
+        &mut self,
+        model: &Model,
+        target: &Buffer,
+        picture: Rect,
+        uncovered: &[bool],
+    ) -> String {
         let wanted = wanted(model);
         let grid = wanted.as_ref().map(|(protocol, grid, _)| (*protocol, *grid));
         let mut removal = String::new();
@@ -73,7 +79,7 @@ impl PanelTiles {
         let mut changed = !self.detail.as_ref().is_some_and(|old| Arc::ptr_eq(old, &detail));
         self.detail = Some(detail);
         for (i, tile) in self.tiles.iter_mut().enumerate() {
-            let (covered, holes) = covering(&tile.image, target, picture);
+            let (covered, holes) = covering(&tile.image, target, picture, uncovered);
             let is_kept = !covered && holes == tile.holes;
             changed |= tile.covered != covered || holes != tile.holes;
             (tile.covered, tile.holes) = (covered, holes);
@@ -300,11 +306,12 @@ fn tiles(protocol: Protocol, grid: PixelGrid) -> Vec<Tile> {
 fn covering(
     tile: &TileImage,
     target: &Buffer,
-    (place, uncovered): (Rect, &[bool]),
+    picture: Rect,
+    uncovered: &[bool],
 ) -> (bool, Vec<Position>) {
     let (mut covered, mut holes) = (false, Vec::new());
     for at in tile.place.intersection(target.area).positions() {
-        match mask_index(place, at).map(|index| uncovered.get(index) == Some(&true)) {
+        match mask_index(picture, at).map(|index| uncovered.get(index) == Some(&true)) {
             Some(true) => {}
             Some(false) if matches!(target[at].bg, Color::Rgb(..) | Color::Indexed(_)) => {
                 holes.push(at);

@@ -1,10 +1,9 @@
 //! Thread that writes frames to the terminal, so that a slow terminal does not block the dashboard.
 
 use crossbeam_channel::{Receiver, Sender, bounded};
-use std::io;
 use std::sync::Arc;
-use std::thread;
 use std::time::Instant;
+use std::{io, thread};
 use zerkalo_terminal::Tty;
 
 pub struct Writer {

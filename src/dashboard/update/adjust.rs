@@ -11,9 +11,9 @@ use zerkalo_scene::value::{number, round_significant};
 impl UpdateContext<'_> {
     /// Records an edit and shows the new values of the edited part in a notice.
     fn adjust(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
-        let subject = edit.as_ref().ok().map(|edit| edit.target.clone());
+        let target = edit.as_ref().ok().map(|edit| edit.target.clone());
         self.commit(edit, coalesce);
-        if let Some(values) = subject.and_then(|subject| values(self.scene(), &subject)) {
+        if let Some(values) = target.and_then(|target| values(self.scene(), &target)) {
             self.say(values);
         }
     }
@@ -42,10 +42,7 @@ impl UpdateContext<'_> {
                 Ok(s.clone())
             }
             _ if !self.scene().lights.is_empty() => Ok(Target::Light(0)),
-            _ => {
-                let [found, help] = ["there is no light", "A adds one."].map(str::to_string);
-                Err(EditError { found, help })
-            }
+            _ => Err(EditError::new("there is no light", "A adds one.")),
         }
     }
 
@@ -62,7 +59,7 @@ impl UpdateContext<'_> {
             Target::Light(_) => edit::toggle(self.scene(), &light, "on", true),
             other => {
                 let found = format!("{} has no switch", other.label(self.scene()));
-                Err(EditError { found, help: "Black is off.".to_string() })
+                Err(EditError::new(found, "Black is off."))
             }
         });
         self.adjust(edit, Coalesce::Single);
@@ -96,7 +93,7 @@ impl UpdateContext<'_> {
     /// Focuses the lens on the object that is visible at the centre of film pixel `pixel`.
     pub(super) fn focus_on_pixel(&mut self, pixel: [usize; 2]) {
         match first_hit(self.seen(), pixel) {
-            Some((_, point)) => self.focus_on(point.to_array()),
+            Some(hit) => self.focus_on(hit.point.to_array()),
             None => self.refuse("There is no object to focus on here."),
         }
     }
@@ -120,9 +117,9 @@ impl UpdateContext<'_> {
 
 /// Describes the adjustable values of a light, a material or the lens for a notice. Returns `None`
 /// for other parts of the scene.
-fn values(scene: &Scene, subject: &Target) -> Option<String> {
+fn values(scene: &Scene, target: &Target) -> Option<String> {
     let color = |color: [f64; 3]| format!("color {}", color.map(number).join(" "));
-    let state = match subject {
+    let state = match target {
         Target::Camera => lens(&scene.camera),
         Target::Light(i) => {
             let light = scene.lights.get(*i)?;
@@ -134,7 +131,7 @@ fn values(scene: &Scene, subject: &Target) -> Option<String> {
         Target::Material(name) => {
             let material = scene.materials.get(name)?;
             let [roughness, reflection] = [material.roughness, material.reflection].map(number);
-            let rows = edit::rows(scene, subject).ok()?;
+            let rows = edit::rows(scene, target).ok()?;
             let lobe = rows.into_iter().find(|row| row.key == "lobe");
             let lobe = lobe.map_or_else(String::new, |row| format!(" · {}", row.value));
             format!("roughness {roughness} · reflection {reflection}{lobe}")
@@ -144,7 +141,7 @@ fn values(scene: &Scene, subject: &Target) -> Option<String> {
         | Target::Object(_)
         | Target::Part(..) => return None,
     };
-    Some(format!("{}: {state}", subject.label(scene)))
+    Some(format!("{}: {state}", target.label(scene)))
 }
 
 /// Describes aperture and focus.

@@ -6,7 +6,7 @@ use crate::dashboard::{
     DisplayChannel, Effect, Format, Mode, Model, Overlay, SceneSource, UpdateContext,
 };
 use HintLine as H;
-use std::sync::OnceLock;
+use zerkalo_scene::edit;
 use zerkalo_terminal::event::Key;
 
 /// State that selects the hints in the hint line.
@@ -185,8 +185,8 @@ pub static COMMANDS: &[Command] = &[
     command("objects", "rotate by a typed angle", &[(Rotating, "0 1 2 3 4 5 6 7 8 9 - .")], |c| c.ask_angle()).hints(&[hint(&[H::In(Rotating)], 3, "0-9", "type degrees")]),
     command("objects", "scale the selection", &[(Anywhere, "Alt-s")], |c| c.ask_scale()).also("size larger smaller resize"),
     command("objects", "array of the selection", &[(Anywhere, "Alt-d")], |c| c.ask_array()).also("copies duplicate repeat row"),
-    command("objects", "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
-    command("objects", "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
+    command("objects", "snap the selection to ground", &[(Anywhere, "g")], |c| c.apply(edit::snap_to_ground)).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
+    command("objects", "give the object its own material", &[(Anywhere, "M")], |c| c.apply(edit::own_material)),
     command("objects", "make the selection gold, glass, …", &[(Anywhere, "S")], |c| c.pick_preset()),
     command("objects", "remove unused materials", &[], |c| c.purge_materials()),
 
@@ -289,17 +289,9 @@ pub static COMMANDS: &[Command] = &[
     command("help", "keys that work here", &[(Anywhere, "? F1")], |c| c.open_help()).available(always).also("help manual").hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),
 ];
 
-/// Table with the keys of the user's configuration.
-static REBOUND: OnceLock<Vec<Command>> = OnceLock::new();
-
-/// Returns all commands with the keys in force.
-pub fn table() -> &'static [Command] {
-    REBOUND.get().map_or(COMMANDS, Vec::as_slice)
-}
-
-/// Gives commands other keys, once in a process: each by its index in [`COMMANDS`], in the first context
+/// Returns all commands with other keys for some: each by its index in [`COMMANDS`], in the first context
 /// of its keys, or anywhere. Other commands lose these keys there.
-pub fn rebind(changes: &[(usize, String)]) {
+pub fn rebound(changes: &[(usize, String)]) -> &'static [Command] {
     let mut commands = COMMANDS.to_vec();
     for (index, names) in changes {
         let context = COMMANDS[*index].keys.first().map_or(Anywhere, |(context, _)| *context);
@@ -321,7 +313,7 @@ pub fn rebind(changes: &[(usize, String)]) {
             command.keys = keys.leak();
         }
     }
-    let _ = REBOUND.set(commands);
+    commands.leak()
 }
 
 impl Command {
@@ -359,14 +351,14 @@ impl Command {
     }
 }
 
-/// Returns the command that `key` runs in `context`.
-pub fn lookup(context: KeyContext, key: Key) -> Option<&'static Command> {
+/// Returns which of `commands` `key` runs in `context`.
+pub fn lookup(commands: &[Command], context: KeyContext, key: Key) -> Option<&Command> {
     let name = key.to_string();
     let has_key = |(context, names): &(KeyContext, &str), wanted| {
         *context == wanted && names.split(' ').any(|known| known == name)
     };
     let command_in = |context| {
-        table().iter().find(|command| command.keys.iter().any(|keys| has_key(keys, context)))
+        commands.iter().find(|command| command.keys.iter().any(|keys| has_key(keys, context)))
     };
     context.chain().find_map(command_in)
 }

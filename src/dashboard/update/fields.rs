@@ -1,7 +1,6 @@
 //! Commands on the properties in the inspector and in forms.
 
-use crate::dashboard::panel_lines::RowAct;
-use crate::dashboard::panel_lines::walked;
+use crate::dashboard::panel_lines::{RowAct, walked};
 use crate::dashboard::update::Coalesce;
 use crate::dashboard::{Editor, FieldLine, KeyContext, Overlay, PanelLine, UpdateContext};
 use zerkalo_scene::edit::{self, Edit, EditError, Widget, Word};
@@ -228,9 +227,9 @@ impl UpdateContext<'_> {
         let whole = text.contains(['#', ',', ';', ' ', '[']) || text.contains(is_word);
         match field.component {
             Some(component) if !whole => {
-                edit::set_component(scene, &field.subject, &field.property.key, component, text)
+                edit::set_component(scene, &field.target, &field.property.key, component, text)
             }
-            _ => edit::set(scene, &field.subject, &field.property.key, text),
+            _ => edit::set(scene, &field.target, &field.property.key, text),
         }
     }
 
@@ -244,8 +243,8 @@ impl UpdateContext<'_> {
             return;
         }
         if let Some(field) = self.field() {
-            let FieldLine { subject, property, component, .. } = &field;
-            let edit = edit::step(self.scene(), subject, &property.key, *component, steps);
+            let FieldLine { target, property, component, .. } = &field;
+            let edit = edit::step(self.scene(), target, &property.key, *component, steps);
             self.commit(edit, Coalesce::Repeat);
         }
     }
@@ -253,7 +252,7 @@ impl UpdateContext<'_> {
     /// Sets the property under the cursor; an empty text stands for the default.
     pub(super) fn fill_field(&mut self, value: &str) {
         if let Some(field) = self.field() {
-            let edit = edit::set(self.scene(), &field.subject, &field.property.key, value);
+            let edit = edit::set(self.scene(), &field.target, &field.property.key, value);
             self.commit(edit, Coalesce::Single);
         }
     }

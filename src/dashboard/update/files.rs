@@ -241,8 +241,8 @@ impl UpdateContext<'_> {
                 self.model.file.broken = None;
                 self.model.file.unreadable = false;
                 self.model.history.restart(scene);
-                let mut subjects = outline(self.scene()).into_iter().map(|(_, subject)| subject);
-                let found = subjects.find(|subject| subject.title(self.scene()) == title);
+                let mut targets = outline(self.scene()).into_iter().map(|(_, target)| target);
+                let found = targets.find(|target| target.title(self.scene()) == title);
                 self.model.inspector.editor = None;
                 self.select(found.unwrap_or(Target::Camera));
                 self.show();
@@ -299,10 +299,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn copy_path(&mut self) {
-        let Some(path) = self.model.last_export.clone() else {
-            self.say("No picture was written yet · p writes one");
-            return;
-        };
+        let Some(path) = self.last_export() else { return };
         let text = path.display().to_string();
         if sanitized(&text) != text {
             // Control characters could run commands when pasted into a shell.

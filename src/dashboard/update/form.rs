@@ -44,12 +44,12 @@ impl UpdateContext<'_> {
     /// Opens the form for a new object or light of the kind `what`, which `edit` adds.
     pub(super) fn open_form(&mut self, what: &str, edit: Result<Edit, EditError>) {
         match edit {
-            Ok(Edit { scene, target: subject, label, .. }) => {
+            Ok(Edit { scene, target, label, .. }) => {
                 self.end_mode();
                 self.model.overlay = Some(Overlay::Form(Form {
                     title: format!("new {what}"),
                     scene: Arc::new(scene),
-                    subject,
+                    target,
                     label,
                     fields: FieldList::default(),
                 }));
@@ -80,9 +80,9 @@ impl UpdateContext<'_> {
             Arc::make_mut(&mut scene).materials.remove(&name);
         }
         let scene = Arc::unwrap_or_clone(scene);
-        let edit = Edit { scene, target: form.subject.clone(), label: form.label, note: None };
+        let edit = Edit { scene, target: form.target.clone(), label: form.label, note: None };
         self.record(edit, Coalesce::Single);
-        self.select(form.subject);
+        self.select(form.target);
         let label = self.model.selection.label(self.scene());
         self.say(format!("{label} added · m moves it · r rotates it · u undoes"));
     }

@@ -7,20 +7,26 @@ use zerkalo_terminal::image::ViewerImage;
 use zerkalo_terminal::stores_files;
 
 impl UpdateContext<'_> {
+    /// Returns the path of the last written picture, or says that there is none.
+    pub(super) fn last_export(&mut self) -> Option<PathBuf> {
+        if self.model.last_export.is_none() {
+            self.say("No picture was written yet · p writes one");
+        }
+        self.model.last_export.clone()
+    }
+
     pub(super) fn view_last_export(&mut self) {
-        match self.model.last_export.clone() {
-            Some(path) => self.view_image(path, false),
-            None => self.say("No picture was written yet · p writes one"),
+        if let Some(path) = self.last_export() {
+            self.view_image(path, false);
         }
     }
 
     pub(super) fn download_last_export(&mut self) {
-        match self.model.last_export.clone() {
-            Some(path) if stores_files(&self.model.graphics.terminal) => {
-                self.view_image(path, true);
-            }
-            Some(_) => self.say("iTerm2 and WezTerm store files, this terminal does not · y copies the path for scp"),
-            None => self.say("No picture was written yet · p writes one"),
+        let Some(path) = self.last_export() else { return };
+        if stores_files(&self.model.graphics.terminal) {
+            self.view_image(path, true);
+        } else {
+            self.say("iTerm2 and WezTerm store files, this terminal does not · y copies the path for scp");
         }
     }
 

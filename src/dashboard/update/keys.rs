@@ -40,7 +40,9 @@ impl UpdateContext<'_> {
         self.model.notice.take_if(|notice| notice.until.is_none());
         if let Some(Overlay::ViewerImage(_)) = self.model.overlay {
             // Ctrl-Z and Ctrl-C suspend and quit the program. All other keys close the viewer.
-            match lookup(KeyContext::Overlay, key).filter(|_| key.ctrl) {
+            match lookup(self.model.preferences.commands, KeyContext::Overlay, key)
+                .filter(|_| key.ctrl)
+            {
                 Some(command) => self.run(command),
                 None => self.close_viewer(),
             }
@@ -57,7 +59,8 @@ impl UpdateContext<'_> {
         {
             return;
         }
-        let Some(command) = lookup(self.model.context(), key) else {
+        let Some(command) = lookup(self.model.preferences.commands, self.model.context(), key)
+        else {
             if !self.model.is_busy() {
                 self.say(format!("{key} does nothing here · ? all keys"));
             }

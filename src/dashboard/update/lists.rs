@@ -39,26 +39,26 @@ impl UpdateContext<'_> {
         let position = outline_position(&lines, &self.model.selection).unwrap_or(0);
         if let Some(entry) = lines.get(walked(&lines, position, steps)).and_then(OutlineLine::entry)
         {
-            self.select(entry.subject.clone());
+            self.select(entry.target.clone());
         }
     }
 
     /// Lists the parts of the selected compound, or else opens the inspector.
     pub(super) fn unfold(&mut self) {
-        let subject = self.model.selection.clone();
+        let target = self.model.selection.clone();
         let folded =
-            !subject.parts(self.scene()).is_empty() && !self.model.unfolded.contains(&subject);
+            !target.parts(self.scene()).is_empty() && !self.model.unfolded.contains(&target);
         match folded {
-            true => drop(self.model.unfolded.insert(subject)),
+            true => drop(self.model.unfolded.insert(target)),
             false => self.open(),
         }
     }
 
     /// Hides the parts of the selected compound, or selects the compound of the selected part.
     pub(super) fn fold(&mut self) {
-        let subject = self.model.selection.clone();
-        if !self.model.unfolded.remove(&subject)
-            && let Some(compound) = subject.compound()
+        let target = self.model.selection.clone();
+        if !self.model.unfolded.remove(&target)
+            && let Some(compound) = target.compound()
         {
             self.select(compound);
         }

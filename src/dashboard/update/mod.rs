@@ -249,19 +249,19 @@ impl UpdateContext<'_> {
 
     /// Records an edit and selects the edited part. Returns `true` if the scene has changed.
     fn commit_and_select(&mut self, edit: Result<Edit, EditError>) -> bool {
-        let subject = edit.as_ref().ok().map(|edit| edit.target.clone());
+        let target = edit.as_ref().ok().map(|edit| edit.target.clone());
         let changed = self.commit(edit, Coalesce::Single);
-        if let Some(subject) = subject {
-            self.select(subject);
+        if let Some(target) = target {
+            self.select(target);
         }
         changed
     }
 
-    fn select(&mut self, subject: Target) {
+    fn select(&mut self, target: Target) {
         self.model.chosen_by_deletion = false;
-        self.model.unfolded.extend(successors(subject.compound(), Target::compound));
-        if self.model.selection != subject {
-            self.model.selection = subject;
+        self.model.unfolded.extend(successors(target.compound(), Target::compound));
+        if self.model.selection != target {
+            self.model.selection = target;
             self.model.inspector = FieldList::default();
             self.skip_text();
         }

@@ -59,22 +59,12 @@ impl UpdateContext<'_> {
             if !self.moves_or_rotates() {
                 self.end_gesture();
             }
-            let Mouse { column, row, modified, .. } = mouse;
             // Watched films have no camera to orbit and no objects to select.
             let is_inert = self.model.watch.is_some() && self.model.mode != Mode::Probe;
-            let (last, in_picture) = ([column, row], is_in(mouse, layout.image) && !is_inert);
-            let drag = Drag {
-                button,
-                modified,
-                last,
-                moved: false,
-                in_picture,
-                on_number: false,
-                moves: false,
-            };
-            let grabs = button == Button::Left && !modified && self.model.mode == Mode::Orbit;
+            let in_picture = is_in(mouse, layout.image) && !is_inert;
+            let grabs = button == Button::Left && !mouse.modified && self.model.mode == Mode::Orbit;
             let moves = grabs && in_picture && self.grab(&layout, mouse);
-            self.model.drag = Some(Drag { moves, ..drag });
+            self.model.drag = Some(Drag { in_picture, moves, ..Drag::new(button, mouse) });
         } else if let Some((rows, _)) = self.model.inspector_rows()
             && is_in(mouse, layout.inspector)
         {
@@ -108,7 +98,7 @@ impl UpdateContext<'_> {
     }
 
     /// Returns `true` if the first hit of a ray is on the selected object or part.
-    fn is_on_selection(&self, (object, point): (usize, DVec3)) -> bool {
+    fn is_on_selection(&self, ObjectHit { object, point }: ObjectHit) -> bool {
         let eye = DVec3::from_array(self.seen().camera.eye);
         let selection = &self.model.selection;
         match selection {
@@ -123,7 +113,7 @@ impl UpdateContext<'_> {
 
     /// Returns what a click on an object selects: the object or, if it is selected already, the part
     /// at `point`.
-    fn clicked(&self, (object, point): (usize, DVec3)) -> Target {
+    fn clicked(&self, ObjectHit { object, point }: ObjectHit) -> Target {
         let eye = DVec3::from_array(self.seen().camera.eye);
         let solid = match self.model.selection {
             Target::Object(i) | Target::Part(i, _) if i == object => {
@@ -141,21 +131,21 @@ impl UpdateContext<'_> {
         // The line is looked up first, because a change of focus may change the layout.
         let lines = self.model.outline_lines();
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
-        let subject = line.and_then(OutlineLine::entry).map(|entry| entry.subject.clone());
+        let target = line.and_then(OutlineLine::entry).map(|entry| entry.target.clone());
         let again =
-            self.model.focus == Focus::Outline && subject.as_ref() == Some(&self.model.selection);
+            self.model.focus == Focus::Outline && target.as_ref() == Some(&self.model.selection);
         self.set_focus(Focus::Outline);
-        match subject {
-            Some(subject) if mouse.modified => {
+        match target {
+            Some(target) if mouse.modified => {
                 // The selection joins the marked parts.
-                if self.model.marked.is_empty() && subject != self.model.selection {
+                if self.model.marked.is_empty() && target != self.model.selection {
                     self.toggle_mark();
                 }
-                self.select(subject);
+                self.select(target);
                 self.toggle_mark();
             }
-            Some(subject) => {
-                self.select(subject);
+            Some(target) => {
+                self.select(target);
                 match line.and_then(OutlineLine::entry).and_then(|entry| entry.unfolded) {
                     Some(true) if again => self.fold(),
                     Some(false) => self.unfold(),
@@ -177,18 +167,7 @@ impl UpdateContext<'_> {
         let pressed = line.and_then(|line| lines.get(line)?.entry());
         let on_number = pressed
             .is_some_and(|field| matches!(field.property.widget, Widget::Numbers | Widget::Color));
-        let Mouse { column, row, modified, .. } = mouse;
-        let (last, button) = ([column, row], Button::Left);
-        let drag = Drag {
-            button,
-            modified,
-            last,
-            moved: false,
-            in_picture: false,
-            on_number,
-            moves: false,
-        };
-        self.model.drag = Some(drag).filter(|drag| drag.on_number);
+        self.model.drag = on_number.then(|| Drag { on_number, ..Drag::new(Button::Left, mouse) });
         match line.filter(|line| lines.get(*line).and_then(PanelLine::entry).is_some()) {
             Some(line) if opens && line == cursor => self.open_row(),
             Some(line) if self.apply_field() => {
@@ -360,9 +339,16 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns index and hit point of the first object on the ray through the centres of the lens and
-/// of a film pixel (column, row).
-pub(super) fn first_hit(scene: &Scene, [x, y]: [usize; 2]) -> Option<(usize, DVec3)> {
+/// Index of an object, and a point on its surface.
+#[derive(Clone, Copy)]
+pub(super) struct ObjectHit {
+    object: usize,
+    pub point: DVec3,
+}
+
+/// Returns the first hit on the ray through the centres of the lens and of a film pixel (column,
+/// row).
+pub(super) fn first_hit(scene: &Scene, [x, y]: [usize; 2]) -> Option<ObjectHit> {
     let camera = &scene.camera;
     let [width, height] = scene.film.size.map(f64::from);
     let half = camera.half_size([width, height]);
@@ -371,10 +357,8 @@ pub(super) fn first_hit(scene: &Scene, [x, y]: [usize; 2]) -> Option<(usize, DVe
     let direction =
         forward + right * (half[0] * across(x, width)) - up * (half[1] * across(y, height));
     let origin = DVec3::from_array(camera.eye) + direction * camera.near;
-    let hits = scene
-        .objects
-        .iter()
-        .enumerate()
-        .filter_map(|(i, object)| Some((i, object.form().cast(origin, direction)?)));
-    hits.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, t)| (i, origin + direction * t))
+    let objects = scene.objects.iter().enumerate();
+    let hits = objects.filter_map(|(i, object)| Some((i, object.form().cast(origin, direction)?)));
+    let (object, t) = hits.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(ObjectHit { object, point: origin + direction * t })
 }

@@ -63,13 +63,13 @@ impl UpdateContext<'_> {
 
     /// Marks the selection, or removes its mark.
     pub(super) fn toggle_mark(&mut self) {
-        let subject = self.model.selection.clone();
-        if !matches!(subject, Target::Object(_) | Target::Part(..) | Target::Light(_)) {
+        let target = self.model.selection.clone();
+        if !matches!(target, Target::Object(_) | Target::Part(..) | Target::Light(_)) {
             return self.refuse("Only objects, parts and lights are marked");
         }
-        match self.model.marked.iter().position(|marked| *marked == subject) {
+        match self.model.marked.iter().position(|marked| *marked == target) {
             Some(at) => drop(self.model.marked.remove(at)),
-            None => self.model.marked.push(subject),
+            None => self.model.marked.push(target),
         }
         let text = match self.model.marked.is_empty() {
             true => "nothing is marked".to_string(),
@@ -130,8 +130,7 @@ impl UpdateContext<'_> {
     /// Scales the selection or the marked parts about their foot.
     pub(super) fn scale_selection(&mut self, factor: f64) -> Result<(), String> {
         let foot = self.foot();
-        let edit = self.edit_marked("scale", |s, target| edit::scale(s, target, factor, foot));
-        let edit = edit.map_err(|error| error.to_string())?;
+        let edit = self.edit_marked("scale", |s, target| edit::scale(s, target, factor, foot))?;
         self.record(edit, Coalesce::Single);
         Ok(())
     }
@@ -139,7 +138,7 @@ impl UpdateContext<'_> {
     /// Adds `count` copies of the selection or the marked parts, each moved `by` from the one before.
     pub(super) fn array(&mut self, count: u32, by: DVec3) -> Result<(), String> {
         let copied = |s: &Scene, target: &Target| edit::repeat(s, target, count, by.to_array());
-        let edit = self.edit_marked("array of", copied).map_err(|error| error.to_string())?;
+        let edit = self.edit_marked("array of", copied)?;
         self.record(edit, Coalesce::Single);
         Ok(())
     }
@@ -164,8 +163,9 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    pub(super) fn snap_to_ground(&mut self) {
-        let edit = edit::snap_to_ground(self.scene(), &self.model.selection);
+    /// Applies an edit of the selection, as one undo step.
+    pub(super) fn apply(&mut self, edit: fn(&Scene, &Target) -> Result<Edit, EditError>) {
+        let edit = edit(self.scene(), &self.model.selection);
         self.commit(edit, Coalesce::Single);
     }
 
@@ -243,11 +243,6 @@ impl UpdateContext<'_> {
 
     pub(super) fn purge_materials(&mut self) {
         let edit = edit::purge_materials(self.scene());
-        self.commit(edit, Coalesce::Single);
-    }
-
-    pub(super) fn own_material(&mut self) {
-        let edit = edit::own_material(self.scene(), &self.model.selection);
         self.commit(edit, Coalesce::Single);
     }
 }

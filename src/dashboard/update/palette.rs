@@ -3,12 +3,12 @@
 
 use crate::dashboard::panel_lines::inspector;
 use crate::dashboard::update::Coalesce;
-use crate::dashboard::update::commands::{Command, table};
+use crate::dashboard::update::commands::Command;
 use crate::dashboard::{
     Effect, FieldLine, Focus, KeyContext, Overlay, PanelLine, PickEntry, UpdateContext,
 };
 use std::collections::HashSet;
-use zerkalo_scene::edit::{self, SceneSettings, Target, outline as subjects};
+use zerkalo_scene::edit::{self, SceneSettings, Target, outline};
 
 /// Number of palette entries that come first because they were chosen last.
 const RECENT: usize = 12;
@@ -78,7 +78,8 @@ impl UpdateContext<'_> {
             let place = context.chain().position(|place| has_keys(command, place));
             place.unwrap_or(usize::MAX)
         };
-        let mut commands: Vec<_> = table().iter().filter(|c| c.is_listed(self.model)).collect();
+        let mut commands: Vec<_> =
+            self.model.preferences.commands.iter().filter(|c| c.is_listed(self.model)).collect();
         commands.sort_by_key(rank);
         let entry = |command: &Command| {
             let entry = PickEntry::of(command, watching);
@@ -108,7 +109,8 @@ impl UpdateContext<'_> {
 
     fn palette(&self) -> Vec<(PickEntry, Choice)> {
         let watching = self.model.watch.is_some();
-        let listed = table().iter().filter(|command| command.is_listed(self.model));
+        let listed =
+            self.model.preferences.commands.iter().filter(|command| command.is_listed(self.model));
         let mut list: Vec<_> =
             listed.map(|c| (PickEntry::of(c, watching), Choice::Run(c))).collect();
         if watching || self.model.file.unreadable {
@@ -117,7 +119,7 @@ impl UpdateContext<'_> {
         let scene = self.scene();
         let mut names = HashSet::new();
         for field in self.reachable_fields() {
-            let name = format!("{} of {}", field.property.label, field.subject.label(scene));
+            let name = format!("{} of {}", field.property.label, field.target.label(scene));
             if names.insert(name.clone()) {
                 let last = field.property.key.rsplit('.').next();
                 let also = SYNONYMS.iter().find(|(key, _)| Some(*key) == last);
@@ -126,9 +128,9 @@ impl UpdateContext<'_> {
                 list.push((entry, Choice::Edit(Box::new(field))));
             }
         }
-        for (section, subject) in subjects(scene) {
-            let name = format!("select {}", subject.title(scene));
-            list.push((PickEntry::new(name, section.title()), Choice::Select(subject)));
+        for (section, target) in outline(scene) {
+            let name = format!("select {}", target.title(scene));
+            list.push((PickEntry::new(name, section.title()), Choice::Select(target)));
         }
         list
     }
@@ -140,10 +142,9 @@ impl UpdateContext<'_> {
         let selection = &self.model.selection;
         let mirror = edit::mirror(scene, Some(selection));
         let settings = [SceneSettings::Film, SceneSettings::Integrator].map(Target::Settings);
-        let subjects =
-            [Some(selection.clone()), mirror.map(Target::Material), Some(Target::Camera)];
-        let lines = subjects.into_iter().flatten().chain(settings);
-        let lines = lines.flat_map(|subject| inspector(scene, &subject));
+        let targets = [Some(selection.clone()), mirror.map(Target::Material), Some(Target::Camera)];
+        let lines = targets.into_iter().flatten().chain(settings);
+        let lines = lines.flat_map(|target| inspector(scene, &target));
         lines
             .filter_map(|line| if let PanelLine::Entry(field) = line { Some(*field) } else { None })
             .collect()
@@ -158,16 +159,16 @@ impl UpdateContext<'_> {
         self.model.recent.truncate(RECENT);
         match choice {
             Choice::Run(command) => self.run(command),
-            Choice::Select(subject) => {
-                self.select(subject);
+            Choice::Select(target) => {
+                self.select(target);
                 let label = self.model.selection.label(self.scene());
                 self.say(label);
             }
             Choice::Edit(field) => {
-                let shown = self.model.selection == field.subject
-                    || self.model.selection.material(self.scene()).as_ref() == Some(&field.subject);
+                let shown = self.model.selection == field.target
+                    || self.model.selection.material(self.scene()).as_ref() == Some(&field.target);
                 if !shown {
-                    self.select(field.subject.clone());
+                    self.select(field.target.clone());
                 }
                 self.set_focus(Focus::Inspector);
                 self.show_row(|line| line.is_same(&field));
@@ -235,9 +236,9 @@ impl UpdateContext<'_> {
         if !number(&field) {
             (field.component, field.value) = (None, field.property.value.clone());
         }
-        let edit = self.set_field(&field, value).map_err(|error| error.to_string())?;
+        let edit = self.set_field(&field, value)?;
         self.record(edit, Coalesce::Single);
-        let label = field.subject.label(self.scene());
+        let label = field.target.label(self.scene());
         self.say(format!("{name} of {label}: {value}"));
         Ok(())
     }

@@ -37,9 +37,9 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn ask_name(&mut self) {
-        let (scene, subject) = (self.scene(), &self.model.selection);
-        let label = subject.label(scene);
-        let name = match subject {
+        let (scene, target) = (self.scene(), &self.model.selection);
+        let label = target.label(scene);
+        let name = match target {
             Target::Light(i) => scene.lights.get(*i).map(|light| light.name.clone()),
             Target::Object(i) => scene.objects.get(*i).map(|object| object.name.clone()),
             Target::Material(name) | Target::View(name) => Some(name.clone()),
@@ -169,15 +169,13 @@ impl UpdateContext<'_> {
     }
 
     fn rename(&mut self, text: &str) -> Result<(), String> {
-        let subject = &self.model.selection;
-        let edit = edit::rename(self.scene(), subject, text).map_err(|e| e.to_string())?;
+        let edit = edit::rename(self.scene(), &self.model.selection, text)?;
         self.commit_and_select(Ok(edit));
         Ok(())
     }
 
     fn store_view(&mut self, text: &str) -> Result<(), String> {
-        let edit = self.edit_seen(|seen| edit::store_view(seen, Some(text)));
-        let edit = edit.map_err(|e| e.to_string())?;
+        let edit = self.edit_seen(|seen| edit::store_view(seen, Some(text)))?;
         self.record(edit, Coalesce::Single);
         let number =
             self.scene().cameras.keys().position(|name| name == text).map_or(0, |index| index + 1);
@@ -205,7 +203,7 @@ impl UpdateContext<'_> {
             return Err(format!("Unexpected \"{}\".", truncated(more)));
         }
         let film = edit::set(self.seen(), &Target::Settings(SceneSettings::Film), "size", size);
-        let scene = film.map_err(|error| error.to_string())?.scene;
+        let scene = film?.scene;
         let size = scene.film.size;
         self.model.export = Some(RunningExport { size, progress: 0.0, left: None });
         let (display, stop) = (self.model.display, self.model.stop);

@@ -18,17 +18,18 @@ const LENGTH: &str = "scene units";
 /// Draws the inspector. Returns the position of the text cursor.
 pub fn inspector(model: &Model, layout: &Layout, painter: &mut Painter) -> Option<Position> {
     let area = layout.inspector?;
-    let areas = model.inspector_rows()?;
+    let (list, help) = model.inspector_rows()?;
     let active = is_active(model, Focus::Inspector);
     painter.panel(area, &model.selection.title(model.scene()), active);
-    draw(model, areas, active, painter)
+    draw(model, list, help, active, painter)
 }
 
 /// Draws the properties of the open form, or of the inspector, and help on the property under the
 /// cursor. Returns the position of the text cursor.
 pub fn draw(
     model: &Model,
-    (list, help): (Rect, Rect),
+    list: Rect,
+    help: Rect,
     active: bool,
     painter: &mut Painter,
 ) -> Option<Position> {

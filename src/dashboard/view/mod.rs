@@ -80,7 +80,11 @@ impl View {
     /// Draws `model` into `buffer`, which must be empty and have the size of the screen. Returns
     /// the position of the text cursor.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
-        let theme = Theme { colors: model.colors, on_light: model.on_light };
+        let theme = Theme {
+            colors: model.colors,
+            on_light: model.on_light,
+            tones: model.preferences.tones,
+        };
         let painter = &mut Painter { theme, buffer };
         (self.place, self.uncovered) = (Rect::ZERO, Vec::new());
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {

@@ -22,18 +22,18 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
             OutlineLine::Heading(title) => {
                 painter.row(inner, row).skip(1).put(title, theme.heading());
             }
-            OutlineLine::Entry(OutlineEntry { subject, label, depth, unfolded, note }) => {
-                let selected = (*subject == model.selection).then_some(active);
+            OutlineLine::Entry(OutlineEntry { target, label, depth, unfolded, note }) => {
+                let selected = (*target == model.selection).then_some(active);
                 let ListRow { mut to, name, note: noted, .. } =
                     painter.list_row(inner, row, selected);
-                let id = match subject {
+                let id = match target {
                     Target::Object(i) if with_ids => theme.swatch(object_color(*i as u32)),
                     _ => None,
                 };
                 match id {
                     Some(style) => to.put(" ", name).put("■", style).put(" ", name),
                     None => {
-                        let mark = if model.marked.contains(subject) { "●" } else { " " };
+                        let mark = if model.marked.contains(target) { "●" } else { " " };
                         to.put(if selected.is_some() { " ▸" } else { "  " }, name).put(mark, name)
                     }
                 };

@@ -29,7 +29,7 @@ pub fn draw(model: &Model, painter: &mut Painter) -> Option<Position> {
         Overlay::NoiseTargets(at) => painter.noise_targets(model, at.index),
         Overlay::Pick(pick) => return painter.pick(pick),
         Overlay::Form(_) => {
-            return fields::draw(model, (place.list, place.help), true, painter.painter);
+            return fields::draw(model, place.list, place.help, true, painter.painter);
         }
         Overlay::Prompt(prompt) => return painter.prompt(prompt),
         Overlay::Question(question) => painter.question(question),

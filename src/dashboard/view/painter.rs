@@ -187,12 +187,14 @@ fn safe(text: &str) -> Cow<'_, str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dashboard::Preferences;
     use zerkalo_terminal::cells::Colors;
 
     #[test]
     fn text_is_clipped_to_its_area() {
         let mut buffer = Buffer::empty(Rect::new(0, 0, 8, 2));
-        let theme = Theme { colors: Colors::Mono, on_light: false };
+        let tones = Preferences::default().tones;
+        let theme = Theme { colors: Colors::Mono, on_light: false, tones };
         let mut painter = Painter { theme, buffer: &mut buffer };
         let area = Rect { x: 2, y: 1, width: 4, height: 1 };
         painter.row(area, 0).put("abcdefgh", Style::new());

@@ -126,8 +126,8 @@ fn largest(mut found: Vec<(f64, String)>) -> Option<String> {
 pub fn seen(model: &Model, pixel: [usize; 2]) -> Option<String> {
     let hits = model.snapshot.as_ref()?.first_hits.as_deref()?;
     let object = hits.at_pixel(pixel)?.object?;
-    let subject = Target::Object(object as usize);
-    subject.exists(model.scene()).then(|| subject.label(model.scene()))
+    let target = Target::Object(object as usize);
+    target.exists(model.scene()).then(|| target.label(model.scene()))
 }
 
 /// Draws a character in a cell of the picture, in a colour that contrasts with its background.

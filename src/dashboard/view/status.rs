@@ -13,6 +13,7 @@ use ratatui::style::{Modifier, Style};
 use zerkalo_render::ErrorParts;
 use zerkalo_render::schedule::StoppedBy;
 use zerkalo_render::session::{Report, Snapshot, State};
+use zerkalo_world::Precision;
 
 /// Part of the status line, shown or omitted as a whole.
 struct Part {
@@ -112,7 +113,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     }
     if !watching {
         let plural = if report.threads == 1 { "" } else { "s" };
-        parts.push(part(7, vec![dim(report.precision)]));
+        parts.push(part(7, vec![dim(report.precision.map_or("", Precision::name))]));
         parts.push(part(5, vec![dim(&format!("{} thread{plural}", report.threads))]));
     }
     parts

@@ -5,7 +5,6 @@
 
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::BorderType;
-use std::sync::OnceLock;
 use zerkalo_terminal::cells::{Colors, nearest_xterm};
 
 /// Styles for a set of terminal colours.
@@ -13,13 +12,18 @@ use zerkalo_terminal::cells::{Colors, nearest_xterm};
 pub struct Theme {
     pub colors: Colors,
     pub on_light: bool,
+    pub tones: Tones,
 }
 
 /// Colour at three depths: 24 bits, index of xterm's 256 colours, one of 16 colours.
 pub type Tone = ([u8; 3], u8, Color);
+/// Colours in the order of [`SHIPPED_TONES`].
+pub type Tones = [Tone; TONES];
+
+const TONES: usize = 9;
 
 /// Names of the tones in configuration files, and the tones as shipped. The constants are their indices.
-pub const SHIPPED_TONES: [(&str, Tone); 9] = [
+pub const SHIPPED_TONES: [(&str, Tone); TONES] = [
     ("accent", ([98, 160, 242], 75, Color::Cyan)),
     ("dim", ([125, 130, 142], 245, Color::DarkGray)),
     ("border", ([84, 90, 104], 240, Color::DarkGray)),
@@ -41,18 +45,6 @@ const SELECTED_GROUND: usize = 6;
 const SELECTED_TEXT: usize = 7;
 const BADGE_GROUND: usize = 8;
 
-/// Tones by the user's configuration.
-static TONES: OnceLock<[Tone; 9]> = OnceLock::new();
-
-/// Sets the tones of the process, once.
-pub fn set_tones(tones: [Tone; 9]) {
-    let _ = TONES.set(tones);
-}
-
-pub fn tones() -> [Tone; 9] {
-    TONES.get().copied().unwrap_or(SHIPPED_TONES.map(|(_, tone)| tone))
-}
-
 impl Theme {
     fn color(&self, (rgb, indexed, ansi): Tone) -> Option<Color> {
         match self.colors {
@@ -69,7 +61,7 @@ impl Theme {
 
     /// Returns the style with the colour of the tone with this index, or with `plain` on terminals without colours.
     fn toned(&self, tone: usize, plain: Modifier) -> Style {
-        match self.color(tones()[tone]) {
+        match self.color(self.tones[tone]) {
             Some(color) => Style::new().fg(color),
             None => Style::new().add_modifier(plain).remove_modifier(Modifier::DIM - plain),
         }
@@ -110,7 +102,7 @@ impl Theme {
         match (active, self.colors) {
             (false, _) => self.accent().add_modifier(Modifier::BOLD),
             (true, Colors::True | Colors::Indexed) => {
-                let ground = self.color(tones()[SELECTED_GROUND]).unwrap_or_default();
+                let ground = self.color(self.tones[SELECTED_GROUND]).unwrap_or_default();
                 self.toned(SELECTED_TEXT, Modifier::empty()).bg(ground)
             }
             (true, _) => Style::new().add_modifier(Modifier::REVERSED),
@@ -123,7 +115,7 @@ impl Theme {
 
     /// Returns the ground of marks on the picture.
     pub fn badge(&self) -> Style {
-        self.color(tones()[BADGE_GROUND]).map_or(Style::new(), |ground| Style::new().bg(ground))
+        self.color(self.tones[BADGE_GROUND]).map_or(Style::new(), |ground| Style::new().bg(ground))
     }
 
     /// Returns the border type. With few or no colours, a thick border marks the focus.

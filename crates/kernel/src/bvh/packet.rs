@@ -3,8 +3,7 @@
 //! Arithmetic Culling Methods for Entire Ray Packets*). Its rays are then tested only against boxes
 //! that pass. Single-ray traversal uses the same test, with the bounds of one ray.
 
-use crate::bvh::Ray;
-use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
+use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn};
 
 /// Ray packet with values precomputed for slab tests against bounding boxes.

@@ -244,8 +244,7 @@ fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::testing::TestFilm;
-    use crate::film::testing::{each_tile, fill, film, white};
+    use crate::film::testing::{TestFilm, each_tile, fill, film, white};
     use crate::film::tile::lattice_pixels;
     use proptest::prelude::*;
 

@@ -86,8 +86,7 @@ impl Tile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::testing::TestFilm;
-    use crate::film::testing::{each_tile, fill, film, only, white};
+    use crate::film::testing::{TestFilm, each_tile, fill, film, only, white};
 
     #[test]
     fn pixel_is_the_weighted_mean_of_both_replicates() {

@@ -48,8 +48,7 @@ impl LinearImage {
 mod tests {
     use super::*;
     use crate::film::Thumbnail;
-    use crate::film::testing::TestFilm;
-    use crate::film::testing::{each_tile, fill, film, white};
+    use crate::film::testing::{TestFilm, each_tile, fill, film, white};
 
     fn pixel(image: &LinearImage, x: usize, y: usize) -> [f32; 3] {
         image.pixels[y * image.size[0] + x]

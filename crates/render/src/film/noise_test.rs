@@ -1,10 +1,8 @@
 //! Tests of the noise estimate: pictures with a known error.
 
 use crate::film::noise::*;
-use crate::film::testing::TestFilm;
-use crate::film::testing::{Rng, each_tile, fill, film, only, white};
-use crate::film::*;
-use crate::film::{Replicates, quantised_8};
+use crate::film::testing::{Rng, TestFilm, each_tile, fill, film, only, white};
+use crate::film::{Replicates, quantised_8, *};
 use zerkalo_scene::Tone;
 
 /// Pixel of known mean in a simulated picture. If `normal` is `false`, a sample is `dark + LIGHT`

@@ -7,6 +7,7 @@ use crate::film::light_weights::{LightWeights, Replicates, Sums};
 use crate::film::noise::{Estimator, Noise};
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::collections::TryReserveError;
+use zerkalo_world::Precision;
 
 /// Least size, in bytes, of a film whose tiles are all allocated before the first sample.
 const RESERVED_FROM: u64 = 64 << 20;
@@ -23,8 +24,8 @@ pub struct Header {
     pub scales: Vec<f64>,
     /// Random seed of all samples.
     pub seed: u64,
-    /// Floating-point precision of the samples, `single` or `double`.
-    pub precision: String,
+    /// Floating-point precision of the samples, single or double.
+    pub precision: Precision,
 }
 
 impl Header {
@@ -302,7 +303,7 @@ impl Film {
                 ("size", format!("{}x{}", h.width, h.height)),
                 ("light group scales", format!("{:?}", h.scales)),
                 ("seed", h.seed.to_string()),
-                ("precision", h.precision.clone()),
+                ("precision", h.precision.name().to_string()),
             ]
         };
         let ours = properties(&self.header);
@@ -319,8 +320,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::testing::TestFilm;
-    use crate::film::testing::{fill, film, white};
+    use crate::film::testing::{TestFilm, fill, film, white};
 
     #[test]
     fn tiles_cover_the_film() {
@@ -398,7 +398,7 @@ mod tests {
             (altered(|h| h.scales = vec![2.0]), "scales [1.0] here, [2.0] there"),
             (altered(|h| h.scales = vec![1.0, 1.0]), "[1.0] here, [1.0, 1.0] there"),
             (altered(|h| h.seed = 2), "seed 1 here, 2 there"),
-            (altered(|h| h.precision = "double".into()), "precision single here, double there"),
+            (altered(|h| h.precision = Precision::Double), "precision single here, double there"),
         ];
         for (other, difference) in others {
             let message = ours.add(&other).unwrap_err();

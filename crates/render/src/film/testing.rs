@@ -2,11 +2,12 @@
 
 use crate::film::file::FilmFileHeader;
 use crate::film::{Display, Film, Header, LightWeights, Replicates, TILE, Tile};
+use zerkalo_world::Precision;
 
 /// Returns an empty film of `width` x `height` pixels with a light group for each of `scales`.
 pub fn film(width: usize, height: usize, scales: &[f64]) -> Film {
     let scales = scales.to_vec();
-    Film::new(Header { width, height, scales, seed: 1, precision: "single".to_string() })
+    Film::new(Header { width, height, scales, seed: 1, precision: Precision::Single })
 }
 
 /// Returns light weights of 1 for each of `groups` groups.
@@ -116,8 +117,8 @@ impl TestFilm for Film {
         }
         header.scales.iter().for_each(|scale| out.extend(scale.to_le_bytes()));
         out.extend(header.seed.to_le_bytes());
-        out.extend(u32_bytes(header.precision.len()));
-        out.extend(header.precision.as_bytes());
+        out.extend(u32_bytes(header.precision.name().len()));
+        out.extend(header.precision.name().as_bytes());
         out.extend(self.bad_samples().to_le_bytes());
         (0..self.tile_count()).for_each(|index| add_tile(self.tile(index), &mut out));
         match self.saturated_samples() {

@@ -37,25 +37,26 @@ impl Bands for &Film {
 }
 
 /// Picture file format with its encoder.
+#[derive(Debug)]
 struct Format {
     extension: &'static str,
     encode: fn(&FilmFileHeader, Depth, &mut dyn Bands, &mut dyn WriteSeek) -> io::Result<()>,
 }
 
-/// Formats of the picture files that can be written. The last one is only chosen by
-/// [`ImageOutput::without_layers`].
-static FORMATS: [Format; 3] = [
+/// Formats that an extension chooses.
+static FORMATS: [Format; 2] = [
     Format { extension: "png", encode: png_writer::encode },
     Format { extension: "exr", encode: exr_writer::encode },
-    Format { extension: "exr", encode: exr_writer::encode_without_layers },
 ];
+/// Format that only [`ImageOutput::without_layers`] chooses.
+static EXR_WITHOUT_LAYERS: Format =
+    Format { extension: "exr", encode: exr_writer::encode_without_layers };
 
 /// Path of a picture file to be written, with a known extension.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct ImageOutput {
     pub path: PathBuf,
-    /// Index in [`FORMATS`].
-    format: usize,
+    format: &'static Format,
     /// Decides if an existing file may be replaced; checked when the write begins and when it ends.
     pub existing: Existing,
 }
@@ -71,28 +72,28 @@ impl ImageOutput {
     /// Creates an output for `path` in the format whose files have the given extension. Accesses no
     /// file.
     pub fn of_format(path: PathBuf, extension: &str) -> Result<Self, WriteError> {
-        let is_known = |format: &Format| extension.eq_ignore_ascii_case(format.extension);
-        if let Some(format) = FORMATS.iter().position(is_known) {
+        let is_known = |format: &&Format| extension.eq_ignore_ascii_case(format.extension);
+        if let Some(format) = FORMATS.iter().find(is_known) {
             return Ok(Self { path, format, existing: Existing::Replace });
         }
         let what = match extension {
             "" => "its name has no extension that names the picture format".to_string(),
             extension => format!("no picture format has the extension .{extension}"),
         };
-        let known = FORMATS[..2].iter().map(|format| format!(".{}", format.extension));
+        let known = FORMATS.iter().map(|format| format!(".{}", format.extension));
         let remedy = format!("known extensions: {}", known.collect::<Vec<_>>().join(", "));
         Err(WriteError::new(&path, ErrorKind::InvalidFilename, what, &remedy))
     }
 
     /// Returns `true` if the format stores linear radiance.
     pub fn is_linear(&self) -> bool {
-        FORMATS[self.format].extension == "exr"
+        self.format.extension == "exr"
     }
 
     /// Leaves out all channels of an EXR file except those of the picture.
     pub fn without_layers(mut self) -> Self {
         if self.is_linear() {
-            self.format = FORMATS.len() - 1;
+            self.format = &EXR_WITHOUT_LAYERS;
         }
         self
     }
@@ -118,7 +119,7 @@ impl ImageOutput {
     ) -> Result<File, WriteError> {
         replace_file(&self.path, self.existing, |file| {
             let mut out = BufWriter::with_capacity(1 << 16, file);
-            (FORMATS[self.format].encode)(header, depth, bands, &mut out)?;
+            (self.format.encode)(header, depth, bands, &mut out)?;
             out.flush()
         })
     }

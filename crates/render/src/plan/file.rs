@@ -60,7 +60,7 @@ impl Plan {
             s.size[1],
             s.seed,
             s.sampler.name(),
-            s.precision,
+            s.precision.name(),
             s.display.exposure_ev,
             s.display.tone.name(),
             s.rays_per_pixel,
@@ -134,9 +134,7 @@ impl Plan {
             })?,
             seed: lines.setting("seed", "an integer from 0", number)?,
             sampler: lines.setting("sampler", "sobol or random", SamplerKind::from_name)?,
-            precision: lines.setting("precision", "single or double", |text| {
-                Precision::from_name(text).map(|_| text.to_string())
-            })?,
+            precision: lines.setting("precision", "single or double", Precision::from_name)?,
             display: Display {
                 exposure_ev: lines.setting("exposure", "a number from -64 to 64", |text| {
                     number(text).filter(|ev: &f64| ev.abs() <= 64.0)

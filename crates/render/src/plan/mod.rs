@@ -28,6 +28,7 @@ use crate::film::{Display, Estimator, Film, TILE};
 pub use crate::schedule::PlannedTile;
 use crate::schedule::{Prediction, Schedule, Settings};
 use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_world::Precision;
 
 /// Largest number of shards of a plan.
 pub const MAX_SHARDS: u32 = 1 << 16;
@@ -45,8 +46,8 @@ pub struct PlanSettings {
     pub size: [u32; 2],
     pub seed: u64,
     pub sampler: SamplerKind,
-    /// Floating-point precision, `single` or `double`.
-    pub precision: String,
+    /// Floating-point precision, single or double.
+    pub precision: Precision,
     /// Display transform under which the noise is estimated.
     pub display: Display,
     /// Value of [`Settings::rays_per_pixel`].

@@ -3,6 +3,7 @@
 use crate::film::Display;
 use crate::plan::{Plan, PlanSettings, PlannedTile};
 use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_world::Precision;
 
 /// Creates the plan of a picture with one row of tiles, divided into `shards` parts. Each entry of
 /// `tiles` has two sample counts of a tile, per pixel and replicate: in the base and in the merged
@@ -21,7 +22,7 @@ pub fn plan(shards: u32, tiles: &[[u32; 2]]) -> Plan {
             size: [16 * tiles.len() as u32, 16],
             seed: 7,
             sampler: SamplerKind::Sobol,
-            precision: "single".into(),
+            precision: Precision::Single,
             display: Display::default(),
             rays_per_pixel: 0,
             noise_levels: 0.25,

@@ -134,7 +134,7 @@ mod tests {
     fn error_target_leaves_room_for_rounding_and_cut_paths() {
         let target = ErrorTarget { levels: 0.6, quantization: 0.3 };
         let stop = Stop { error: Some(target), ..Stop::default() };
-        let mut schedule = Schedule::new(&[256; 4], Settings::new(true, stop));
+        let mut schedule = Schedule::new(&[256; 4], Settings::until(stop));
         schedule.measurable = Measurable { rounding: true, cut_paths: true, primitives: 1 };
         assert!(
             (schedule.noise_target(target) - 0.27f64.sqrt()).abs() < 1e-9 && !schedule.is_probed()

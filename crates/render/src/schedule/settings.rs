@@ -82,9 +82,9 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Creates settings that minimise the displayed error. `rays_per_pixel` is 0; a renderer
-    /// replaces it by the value of the scene.
-    pub fn new(adaptive: bool, stop: Stop) -> Self {
-        Self { adaptive, stop, ..Self::default() }
+    /// Creates adaptive settings that minimise the displayed error. `rays_per_pixel` is 0; a
+    /// renderer replaces it by the value of the scene.
+    pub fn until(stop: Stop) -> Self {
+        Self { adaptive: true, stop, ..Self::default() }
     }
 }

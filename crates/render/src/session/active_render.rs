@@ -349,7 +349,7 @@ impl ActiveRender {
             saturated_pixels: self.state.film.saturated_pixels(),
             recent_samples_per_second: self.speed.unwrap_or(0.0),
             threads: context.pool.current_num_threads(),
-            precision: self.state.world.info().precision,
+            precision: Some(self.state.world.info().precision),
             lanes: self.state.world.info().lanes,
             inventory: Arc::clone(&self.inventory),
         }

@@ -4,6 +4,7 @@ use crate::error_parts::ErrorParts;
 use crate::film::{Display, Film, LightWeights, Noise};
 use crate::schedule::{Interval, Spp, StoppedBy};
 use std::sync::Arc;
+use zerkalo_world::Precision;
 
 /// Noise targets that a user can choose, in 8-bit levels.
 pub const QUALITIES: [f64; 6] = [4.0, 2.0, 1.0, 0.5, 0.25, 0.125];
@@ -61,8 +62,8 @@ pub struct Report {
     /// measurement.
     pub recent_samples_per_second: f64,
     pub threads: usize,
-    /// `single` or `double` in reports of sessions that render, otherwise empty.
-    pub precision: &'static str,
+    /// Precision in reports of sessions that render, otherwise `None`.
+    pub precision: Option<Precision>,
     /// Name of the SIMD type, such as `f32x8`; empty without a scene.
     pub lanes: &'static str,
     /// Features of the compiled scene, such as `2 point lights`, in one line; empty without a

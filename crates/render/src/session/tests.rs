@@ -2,7 +2,7 @@
 //! where every path is long.
 
 use crate::film::Noise;
-use crate::schedule::{Criterion, Interval, Spp, Stop, StoppedBy};
+use crate::schedule::{Interval, Spp, Stop, StoppedBy};
 use crate::session::*;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
@@ -21,8 +21,7 @@ fn session(stop: Stop) -> Session {
         sampling: SampleSettings { seed: 0, kind: SamplerKind::Sobol },
         display: Display::default(),
     };
-    let settings =
-        Settings { adaptive: false, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
+    let settings = Settings { adaptive: false, ..Settings::until(stop) };
     Session::new(1, options, settings).unwrap()
 }
 

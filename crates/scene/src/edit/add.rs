@@ -1,7 +1,5 @@
 //! Adding objects, lights and materials, with defaults that fit the scene.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::bounds::pivot_distance;
 use crate::edit::convert::irradiance_at;
 use crate::edit::placement::{ground_height, place_for};
@@ -62,7 +60,7 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     let base = place_for(scene, room);
     let Some(mut shape) = Shape::fitted_to(kind, base, room) else {
         let found = format!("there is no kind of object called \"{kind}\"");
-        return Err(EditError::new(&found, &format!("Expected one of {}.", names(KINDS))));
+        return Err(EditError::new(found, format!("Expected one of {}.", names(KINDS))));
     };
     face_camera(&mut shape, scene);
     if let Form::Plane(_) = shape.form() {
@@ -164,18 +162,24 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
 /// # Errors
 /// Fails if there is no such kind.
 pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
-    add_light_as(scene, kind, ("", Color::WHITE, 1.0))
+    add_light_as(scene, &ReadyLight { name: "", kind, color: Color::WHITE, size: 1.0 })
 }
 
-/// Adds a light of the kind `kind` above what the camera looks at, to the left or right of the camera:
+/// Light with a look of its own.
+pub(super) struct ReadyLight<'a> {
+    /// Name; empty for that of the kind.
+    pub name: &'a str,
+    pub kind: &'a str,
+    pub color: Color,
+    /// Size in units of that of a new light.
+    pub size: f64,
+}
+
+/// Adds a light above what the camera looks at, to the left or right of the camera:
 /// on the side with fewer lights. It exposes the picture by its distance and colour; half as much if
-/// another light is on. The last argument has its name, or an empty name for that of its kind, its
-/// colour, and its size in units of the usual one.
-pub(super) fn add_light_as(
-    scene: &Scene,
-    kind: &str,
-    (name, color, relative_size): (&str, Color, f64),
-) -> Result<Edit, EditError> {
+/// another light is on.
+pub(super) fn add_light_as(scene: &Scene, ready: &ReadyLight) -> Result<Edit, EditError> {
+    let ReadyLight { name, kind, color, size } = *ready;
     let [right, _, forward] = scene.camera.frame();
     let center = DVec3::from_array(scene.camera.eye) + forward * pivot_distance(scene);
     let radius = view_size(scene)[0] / 4.0;
@@ -193,11 +197,11 @@ pub(super) fn add_light_as(
     let position = (center + from * (1.5 * radius)).map(|x| rounded_to(x, tenth)).to_array();
     let direction = (-from).normalize().map(|x| rounded_to(x, -2)).to_array();
     // A small light is bright, and its image in glossy surfaces is noisy for long.
-    let placement = Placement { position, direction, radius: 0.4 * relative_size * radius };
+    let placement = Placement { position, direction, radius: 0.4 * size * radius };
     let Some(placed) = LightKind::placed(kind, &placement) else {
         let found = format!("there is no kind of light called \"{kind}\"");
         let kinds = names(LightKind::FIELDS);
-        return Err(EditError::new(&found, &format!("Expected one of {kinds}.")));
+        return Err(EditError::new(found, format!("Expected one of {kinds}.")));
     };
     let mut light = Light { color, ..Light::new(placed) };
     let name = if name.is_empty() { light.kind.usual_name() } else { name };

@@ -1,7 +1,5 @@
 //! Bounds of objects and scenes: to frame objects, to step coordinates, and to place new objects.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::Target;
 use crate::edit::compound::{body, form, scene_from_compound};
 use crate::value::floor_log10;

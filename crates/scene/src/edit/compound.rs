@@ -1,7 +1,5 @@
 //! Compounds as trees: access to their parts, and edits that make, change and dissolve compounds.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::add::object_kinds;
 use crate::edit::properties::Word;
 use crate::edit::unique_name::free_object;
@@ -161,7 +159,7 @@ pub fn add_part(scene: &Scene, target: &Target, kind: &str) -> Result<Edit, Edit
     let base = ((low + high) / 2.0).with_y(high.y - 0.5 * size);
     let base = base.map(|x| rounded_to(x, floor_log10(size) - 2));
     let shape = Shape::fitted_to(kind, base, DVec3::splat(size))
-        .ok_or_else(|| EditError::new(&format!("there is no solid called \"{kind}\""), ""))?;
+        .ok_or_else(|| EditError::new(format!("there is no solid called \"{kind}\""), ""))?;
     whole.shape.parts_mut().into_iter().for_each(|of| of.push(CsgOperand::new(shape.clone())));
     let mut next = scene.clone();
     set_body(&mut next, &compound, whole);
@@ -172,7 +170,7 @@ pub fn add_part(scene: &Scene, target: &Target, kind: &str) -> Result<Edit, Edit
 
 fn no_compound(scene: &Scene, target: &Target) -> EditError {
     let help = "Mark objects (V), then | & or _ makes one of them.";
-    EditError::new(&format!("{} is no compound", target.label(scene)), help)
+    EditError::new(format!("{} is no compound", target.label(scene)), help)
 }
 
 /// Joins objects to a compound of the kind `kind` in the place of the first, whose name and material
@@ -182,12 +180,12 @@ pub fn join(scene: &Scene, targets: &[Target], kind: &str) -> Result<Edit, EditE
     for target in targets {
         let Target::Object(i) = target else {
             let found = format!("{} is no object", target.label(scene));
-            return Err(EditError::new(&found, "Only whole objects are joined."));
+            return Err(EditError::new(found, "Only whole objects are joined."));
         };
         let object = scene.objects.get(*i).ok_or_else(|| EditError::gone(target))?;
         if let Some(reason) = unfit_reason(&object.shape) {
             let found = format!("{}: a {} {reason}", target.label(scene), object.shape.key());
-            return Err(EditError::new(&found, "Only solids are joined."));
+            return Err(EditError::new(found, "Only solids are joined."));
         }
         indices.push(*i);
     }
@@ -204,7 +202,7 @@ pub fn join(scene: &Scene, targets: &[Target], kind: &str) -> Result<Edit, EditE
     };
     let of: Vec<_> = indices.iter().map(part).collect();
     let mut shape = Shape::of_kind(kind)
-        .ok_or_else(|| EditError::new(&format!("there is no compound called \"{kind}\""), ""))?;
+        .ok_or_else(|| EditError::new(format!("there is no compound called \"{kind}\""), ""))?;
     shape.parts_mut().into_iter().for_each(|parts| parts.clone_from(&of));
     let mut next = scene.clone();
     let name = match scene.objects[first].name.as_str() {

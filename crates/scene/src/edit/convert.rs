@@ -1,15 +1,12 @@
 //! Conversion between kinds of shapes, lights, textures and cameras, which keeps position, size,
 //! direction and brightness where possible.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::Scene;
 use crate::camera::{Camera, Focus, ViewAngle};
 use crate::edit::bounds::scene_bounds;
 use crate::edit::compound::{body, set_body};
-use crate::edit::lens;
 use crate::edit::set::{label, replace};
-use crate::edit::{Edit, EditError, Target};
+use crate::edit::{Edit, EditError, Target, lens};
 use crate::light::{EmissiveSurface, Falloff, Light, LightKind, LightUnit, Placement};
 use crate::material::Material;
 use crate::shape::Shape;

@@ -1,7 +1,5 @@
 //! Duplicating, deleting and renaming of objects, lights, materials and stored cameras.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::bounds::bounds;
 use crate::edit::compound::{body, copy_part, material, remove_part, set_body};
 use crate::edit::parse_value::name;
@@ -92,8 +90,7 @@ fn add_copy(scene: &mut Scene, target: &Target) -> Result<Target, EditError> {
             Target::View(new)
         }
         Target::Camera | Target::Settings(_) => {
-            let found = format!("there is only one {}", target.label(scene));
-            return Err(EditError::new(&found, ""));
+            return Err(EditError::new(format!("there is only one {}", target.label(scene)), ""));
         }
     })
 }
@@ -131,7 +128,7 @@ pub fn delete(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
         }
         Target::Camera | Target::Settings(_) => {
             let found = format!("{} belongs to every scene", target.label(scene));
-            return Err(EditError::new(&found, "Only its values can be changed."));
+            return Err(EditError::new(found, "Only its values can be changed."));
         }
     };
     Ok(Edit::checked(next, select.unwrap_or(Target::Camera), label)?.with_note(note))
@@ -178,7 +175,7 @@ pub fn rename(scene: &Scene, target: &Target, new: &str) -> Result<Edit, EditErr
     let new = name("name", new)?;
     let mut next = scene.clone();
     let needed = || EditError::new("the name must not be empty", "Type one.");
-    let taken = |what| EditError::new(&format!("there is a {what} \"{new}\" already"), "");
+    let taken = |what| EditError::new(format!("there is a {what} \"{new}\" already"), "");
     let select = match target {
         Target::Object(i) => {
             next.objects[*i].name = new.clone();
@@ -208,7 +205,7 @@ pub fn rename(scene: &Scene, target: &Target, new: &str) -> Result<Edit, EditErr
         }
         Target::Part(..) | Target::Camera | Target::Settings(_) => {
             let found = format!("{} has no name to change", target.label(scene));
-            return Err(EditError::new(&found, ""));
+            return Err(EditError::new(found, ""));
         }
     };
     Edit::checked(next, select, format!("rename {}", target.label(scene)))

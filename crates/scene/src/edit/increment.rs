@@ -1,5 +1,7 @@
 //! Steps by arrow keys: numbers change to the next round number, other values to the next choice.
 
+#![allow(clippy::wildcard_enum_match_arm)]
+
 use crate::Scene;
 use crate::edit::bounds::step_length;
 use crate::edit::part::{given_key, part};
@@ -32,7 +34,7 @@ pub fn step(
         return toggle(scene, target, key, steps > 0.0);
     };
     if component.is_some_and(|c| c >= numbers.len()) {
-        return Err(EditError::new(&format!("{key} has no such number"), ""));
+        return Err(EditError::new(format!("{key} has no such number"), ""));
     }
     let rule = StepRule::of(field, scene, &numbers);
     let count = StepCount::of(steps);
@@ -84,7 +86,7 @@ pub fn toggle(scene: &Scene, target: &Target, key: &str, forward: bool) -> Resul
         }
         _ => {
             let found = format!("arrow keys do not change {}", field.name);
-            return Err(EditError::new(&found, &format!("Type {}.", field.takes)));
+            return Err(EditError::new(found, format!("Type {}.", field.takes)));
         }
     };
     let index = words.iter().position(|word| Some(*word) == present);

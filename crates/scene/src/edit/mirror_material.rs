@@ -1,7 +1,5 @@
 //! Edits of the scene's mirror: a material that reflects.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::target::mirror_of;
 use crate::edit::{Edit, EditError, Target, step};
 use crate::shape::Shape;

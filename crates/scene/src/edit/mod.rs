@@ -1,6 +1,8 @@
 //! Edits of scenes, as pure functions from a valid scene to an [`Edit`], or to an [`EditError`]
 //! with the reason. They use no terminal and no clock, and read only the files that a scene names.
 
+#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
+
 mod add;
 mod bounds;
 mod compound;
@@ -80,9 +82,16 @@ impl fmt::Display for EditError {
 
 impl std::error::Error for EditError {}
 
+impl From<EditError> for String {
+    fn from(error: EditError) -> Self {
+        error.to_string()
+    }
+}
+
 impl EditError {
-    fn new(found: &str, help: &str) -> Self {
-        Self { found: found.to_string(), help: help.to_string() }
+    /// Creates an error with the phrase `found` and the sentences `help`.
+    pub fn new(found: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { found: found.into(), help: help.into() }
     }
 
     fn gone(target: &Target) -> Self {
@@ -94,7 +103,7 @@ impl EditError {
             Target::Part(..) => "there is no such part".to_string(),
             Target::Camera | Target::Settings(_) => "it cannot be read".to_string(),
         };
-        Self::new(&what, "")
+        Self::new(what, "")
     }
 }
 
@@ -103,7 +112,7 @@ impl Edit {
     fn checked(mut scene: Scene, target: Target, label: String) -> Result<Self, EditError> {
         scene.resolve();
         match scene.faults().into_iter().next() {
-            Some(fault) => Err(EditError { found: fault.found, help: fault.help }),
+            Some(fault) => Err(EditError::new(fault.found, fault.help)),
             None => Ok(Self { scene, target, label, note: None }),
         }
     }

@@ -10,13 +10,13 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<KeyValue, EditError> {
     let text = text.trim();
     let wrong = || {
         let found = format!("{} cannot be \"{}\"", field.name, truncated(text));
-        EditError::new(&found, &format!("Expected {}.", field.takes))
+        EditError::new(found, format!("Expected {}.", field.takes))
     };
     let list = |n: usize| match numbers(text) {
         Some(list) if list.len() == n => Ok(list),
         Some(list) => {
             let found = format!("{} needs {n} numbers, not {}", field.name, list.len());
-            Err(EditError::new(&found, &format!("Expected {}.", field.takes)))
+            Err(EditError::new(found, format!("Expected {}.", field.takes)))
         }
         None => Err(wrong()),
     };
@@ -86,7 +86,7 @@ pub(super) fn word<'a>(
         let more = if quoted.len() < words.len() { ", …" } else { "" };
         let meant = did_you_mean(text, words.iter().copied());
         let help = format!("Expected one of {}{more}.{meant}", quoted.join(", "));
-        EditError::new(&format!("{} cannot be \"{}\"", field.name, truncated(text)), &help)
+        EditError::new(format!("{} cannot be \"{}\"", field.name, truncated(text)), help)
     })
 }
 
@@ -95,7 +95,7 @@ pub(super) fn name(what: &str, text: &str) -> Result<String, EditError> {
     let text = text.trim();
     let help = "Expected at most 60 characters, none of them a control character.";
     if text.chars().count() > 60 || sanitized(text) != text {
-        return Err(EditError::new(&format!("{what} cannot be \"{}\"", truncated(text)), help));
+        return Err(EditError::new(format!("{what} cannot be \"{}\"", truncated(text)), help));
     }
     Ok(text.to_string())
 }

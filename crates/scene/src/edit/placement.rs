@@ -1,7 +1,5 @@
 //! Placement of objects: on surfaces that support them, and at positions free of other objects.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::camera::Camera;
 use crate::edit::add::view_size;
 use crate::edit::bounds::{Extent, scene_bounds};

@@ -1,5 +1,7 @@
 //! Properties of an edit target as an inspector shows them: one row per key.
 
+#![allow(clippy::wildcard_enum_match_arm)]
+
 use crate::Scene;
 use crate::edit::convert::{AIM, KIND};
 use crate::edit::parse_value::{color, parse, show};
@@ -16,6 +18,12 @@ pub struct Word {
     pub name: String,
     /// Description of the word; may be empty.
     pub doc: String,
+}
+
+impl Word {
+    pub(super) fn new(name: impl Into<String>, doc: impl Into<String>) -> Self {
+        Self { name: name.into(), doc: doc.into() }
+    }
 }
 
 /// Input element for the value of a property in an inspector. Choices, kinds and lists accept the
@@ -203,16 +211,15 @@ impl PropertyWalker<'_> {
 
     /// Returns the row of `key` without its value.
     fn row(&self, field: &'static Field, key: String, depth: usize) -> Property {
-        let word = |name: &str, doc: &str| Word { name: name.to_string(), doc: doc.to_string() };
         let (widget, words) = match field.takes {
             ValueType::Text if is_material(self.target, field) => {
                 let names = self.scene.materials.keys();
-                (Widget::Choice, names.map(|name| word(name, "")).collect())
+                (Widget::Choice, names.map(|name| Word::new(name, "")).collect())
             }
             ValueType::Text => (Widget::Text, Vec::new()),
             ValueType::Switch => (Widget::Switch, Vec::new()),
             ValueType::Choice(choices) => {
-                (Widget::Choice, choices.iter().map(|c| word(c.name, c.doc)).collect())
+                (Widget::Choice, choices.iter().map(|c| Word::new(c.name, c.doc)).collect())
             }
             ValueType::OneOf(kinds) => (Widget::Kind, words(kinds)),
             ValueType::ListOf(kinds) => (Widget::List, words(kinds)),
@@ -254,7 +261,7 @@ pub(super) fn is_material(target: &Target, field: &Field) -> bool {
 
 /// Returns a [`Word`] for each of the fields `kinds`, with the name and the help text of the field.
 pub(super) fn words(kinds: &[Field]) -> Vec<Word> {
-    kinds.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
+    kinds.iter().map(|k| Word::new(k.name, k.doc)).collect()
 }
 
 /// Returns the ends of the range of usual numbers.

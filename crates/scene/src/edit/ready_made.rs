@@ -1,8 +1,8 @@
 //! Ready-made parts of scenes: solids of a material, a floor, a framed mirror, lights of a colour.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
-use crate::edit::add::{add_light_as, add_object, free_color, plane_height, usual_size};
+use crate::edit::add::{
+    ReadyLight, add_light_as, add_object, free_color, plane_height, usual_size,
+};
 use crate::edit::bounds::pivot_distance;
 use crate::edit::compound::{body, material, set_body};
 use crate::edit::placement::ground_height;
@@ -11,7 +11,7 @@ use crate::edit::unique_name::{free_material, free_object};
 use crate::edit::{Edit, EditError, Target, set};
 use crate::material::Preset;
 use crate::value::{
-    Choice, Color, KeyNode, KeyValue, number, rotated_y, round_nice, round_significant, rounded_to,
+    Color, KeyNode, KeyValue, number, rotated_y, round_nice, round_significant, rounded_to,
 };
 use crate::{Object, Scene};
 use glam::DVec3;
@@ -29,39 +29,38 @@ const BODIES: [(&str, &str); 6] = [
 const FLOOR: &str = "checker floor";
 const MIRROR: &str = "mirror with frame";
 
-/// Name, kind and colour of the lights, and their size in units of that of a new light.
-const LIGHTS: [(&str, &str, Color, f64); 2] = [
-    ("warm lamp", "sphere", Color([1.0, 0.72, 0.4]), 1.0),
-    ("cool window", "rectangle", Color([0.55, 0.74, 1.0]), 2.0),
+const LIGHTS: [ReadyLight; 2] = [
+    ReadyLight { name: "warm lamp", kind: "sphere", color: Color([1.0, 0.72, 0.4]), size: 1.0 },
+    ReadyLight {
+        name: "cool window",
+        kind: "rectangle",
+        color: Color([0.55, 0.74, 1.0]),
+        size: 2.0,
+    },
 ];
 
 /// Returns the name and a description of each ready-made object.
 pub fn ready_objects() -> Vec<Word> {
-    let word = |name: &str, doc: &str| Word { name: name.into(), doc: doc.into() };
     let mut words = vec![
-        word(FLOOR, "glossy squares without end, at height 0"),
-        word(MIRROR, "slightly rough, behind the objects, facing the camera"),
+        Word::new(FLOOR, "glossy squares without end, at height 0"),
+        Word::new(MIRROR, "slightly rough, behind the objects, facing the camera"),
     ];
     for (body, _) in BODIES {
         let name = |preset: &str| format!("{preset} {body}");
-        words.extend(Preset::CHOICES.iter().map(|preset| word(&name(preset.name), preset.doc)));
+        words.extend(Preset::CHOICES.iter().map(|preset| Word::new(name(preset.name), preset.doc)));
     }
     words
 }
 
 /// Returns the name and a description of each ready-made light.
 pub fn ready_lights() -> Vec<Word> {
-    let words = LIGHTS.map(|(name, kind, ..)| Word {
-        name: name.into(),
-        doc: format!("{kind}, aimed at what the camera looks at"),
-    });
-    words.into()
+    let doc = |kind: &str| format!("{kind}, aimed at what the camera looks at");
+    LIGHTS.map(|light| Word::new(light.name, doc(light.kind))).into()
 }
 
 /// Returns the name and a description of each preset of materials.
 pub fn presets() -> Vec<Word> {
-    let word = |preset: &Choice| Word { name: preset.name.into(), doc: preset.doc.into() };
-    Preset::CHOICES.iter().map(word).collect()
+    Preset::CHOICES.iter().map(|preset| Word::new(preset.name, preset.doc)).collect()
 }
 
 /// Adds a ready-made object: one of [`ready_objects`].
@@ -75,10 +74,10 @@ pub fn add_ready_object(scene: &Scene, name: &str) -> Result<Edit, EditError> {
 
 /// Adds a ready-made light: one of [`ready_lights`].
 pub fn add_ready_light(scene: &Scene, name: &str) -> Result<Edit, EditError> {
-    let Some((name, kind, color, size)) = LIGHTS.into_iter().find(|light| light.0 == name) else {
-        return Err(EditError::new(&format!("there is no light called \"{name}\""), ""));
-    };
-    add_light_as(scene, kind, (name, color, size))
+    match LIGHTS.iter().find(|light| light.name == name) {
+        Some(ready) => add_light_as(scene, ready),
+        None => Err(EditError::new(format!("there is no light called \"{name}\""), "")),
+    }
 }
 
 /// Gives an object or a part the material of a preset, or a material the preset itself. A plastic or diffuse
@@ -113,7 +112,7 @@ pub fn purge_materials(scene: &Scene) -> Result<Edit, EditError> {
 fn preset(word: &str) -> Result<Preset, EditError> {
     let mut preset = Preset::default();
     let found = preset.set_value(KeyValue::Text(word.to_string()));
-    let unknown = || EditError::new(&format!("there is no material \"{word}\" ready made"), "");
+    let unknown = || EditError::new(format!("there is no material \"{word}\" ready made"), "");
     found.then_some(preset).ok_or_else(unknown)
 }
 
@@ -168,7 +167,7 @@ fn add_parts(
     let fill =
         |text: String, (word, x): &(&str, f64)| text.replace(&format!("<{word}>"), &number(*x));
     let text = numbers.iter().fold(text.to_string(), fill);
-    let mut parts = Scene::parse(&text, name).map_err(|e| EditError::new(&e.to_string(), ""))?;
+    let mut parts = Scene::parse(&text, name).map_err(|e| EditError::new(e.to_string(), ""))?;
     let mut next = scene.clone();
     for (name, material) in parts.materials {
         let free = free_material(&next, &name);

@@ -1,7 +1,5 @@
 //! Edits that rotate an object or a light about the vertical.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::bounds::scene_bounds;
 use crate::edit::compound::{body, set_body};
 use crate::edit::{Edit, EditError, Target};
@@ -47,7 +45,7 @@ pub fn rotate(scene: &Scene, target: &Target, degrees: f64) -> Result<Edit, Edit
         }
         Target::Camera | Target::View(_) | Target::Material(_) | Target::Settings(_) => {
             let found = format!("{} cannot be rotated", target.label(scene));
-            return Err(EditError::new(&found, "Select an object or a light."));
+            return Err(EditError::new(found, "Select an object or a light."));
         }
     }
     let label = format!("rotate {}", target.label(scene));

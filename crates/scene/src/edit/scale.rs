@@ -1,7 +1,5 @@
 //! Scaling of objects, parts and lights about a point.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::compound::{body, set_body, to_compound};
 use crate::edit::{Edit, EditError, Target, move_by};
 use crate::value::{floor_log10, round_significant, rounded_to};
@@ -22,7 +20,7 @@ pub fn scale(scene: &Scene, target: &Target, factor: f64, about: DVec3) -> Resul
     }
     let Ok(mut body) = body(scene, target) else {
         let found = format!("{} cannot be scaled", target.label(scene));
-        return Err(EditError::new(&found, "Select an object, a part of one or a light."));
+        return Err(EditError::new(found, "Select an object, a part of one or a light."));
     };
     let mut next = scene.clone();
     scale_body(&mut body, factor, to_compound(scene, target).transform_point3(about));

@@ -1,19 +1,17 @@
 //! Edits that set one value by typed text.
 
-use crate::Scene;
-use crate::TransformOp;
 use crate::edit::add::fit_mesh;
 use crate::edit::compound::{body, set_body};
-use crate::edit::convert;
 use crate::edit::convert::{AIM, KIND};
 use crate::edit::parse_value::{parse, word};
 use crate::edit::part::{exclusive_keys, field, fields, part, part_mut};
 use crate::edit::properties::is_material;
-use crate::edit::{Edit, EditError, Target};
+use crate::edit::{Edit, EditError, Target, convert};
 use crate::material::METAL_REMEDY;
 use crate::value::{
     DefaultValue, Field, KeyNode, KeyValue, PRESET, ValueType, node_at, node_at_mut,
 };
+use crate::{Scene, TransformOp};
 
 /// Sets `key` of `target` to the value in `text`. If the key is the transform of an object, `text`
 /// is a kind of step, and an identity step of this kind is appended. An empty `text` sets an
@@ -66,7 +64,7 @@ pub fn set_component(
         Some(KeyValue::Switch(_) | KeyValue::Text(_)) | None => Vec::new(),
     };
     if component >= list.len() {
-        return Err(EditError::new(&format!("{key} has no number {}", component + 1), ""));
+        return Err(EditError::new(format!("{key} has no number {}", component + 1), ""));
     }
     let text = text.trim();
     // Parsing the whole list applies its rules and messages to the new number.
@@ -77,7 +75,7 @@ pub fn set_component(
         .collect();
     if text.is_empty() || text.contains([',', ' ', ';', '[', ']', '#']) {
         let found = format!("number {} of {key} cannot be \"{text}\"", component + 1);
-        return Err(EditError::new(&found, "Expected one number."));
+        return Err(EditError::new(found, "Expected one number."));
     }
     set(scene, target, key, &parts.join(" "))
 }
@@ -88,7 +86,7 @@ pub(super) fn lookup(target: &Target, key: &str) -> Result<&'static Field, EditE
         (Target::Light(_), "kind") => Ok(&KIND),
         (Target::Camera | Target::View(_), "aim") => Ok(&AIM),
         _ => field(fields(target), key)
-            .ok_or_else(|| EditError::new(&format!("there is no key {key} here"), "")),
+            .ok_or_else(|| EditError::new(format!("there is no key {key} here"), "")),
     }
 }
 
@@ -113,7 +111,7 @@ pub(super) fn replace(
         }
     }
     if !node_at_mut(part, key).is_some_and(|node| node.set_value(value)) {
-        return Err(EditError::new(&format!("{key} cannot be set here"), ""));
+        return Err(EditError::new(format!("{key} cannot be set here"), ""));
     }
     if key == PRESET {
         part.rebase();
@@ -135,14 +133,14 @@ fn clear(scene: &Scene, target: &Target, key: &str, field: &Field) -> Result<Edi
         let steps = &mut body.transform;
         match step.split('.').next().and_then(|index| index.parse::<usize>().ok()) {
             Some(i) if i < steps.len() => drop(steps.remove(i)),
-            _ => return Err(EditError::new(&format!("there is no step {key}"), "")),
+            _ => return Err(EditError::new(format!("there is no step {key}"), "")),
         }
         set_body(&mut next, target, body);
     } else if let Some(node) = node_at_mut(part_mut(&mut next, target)?, key) {
         match (field.preset, of_base) {
             (DefaultValue::Required, _) => {
                 let found = format!("{} must not be left out", field.name);
-                return Err(EditError::new(&found, &format!("Expected {}.", field.takes)));
+                return Err(EditError::new(found, format!("Expected {}.", field.takes)));
             }
             (DefaultValue::Is(_), Some(value)) => drop(node.set_value(value)),
             (DefaultValue::Is(text), None) => drop(node.set_value(parse(field, text)?)),

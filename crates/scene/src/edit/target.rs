@@ -1,7 +1,5 @@
 //! Edit targets: parts of a scene that can be selected and edited.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::edit::compound::operand;
 use crate::edit::part::part;
 use crate::value::truncated;

@@ -1,7 +1,5 @@
 //! Edits that move an object, a light or a camera by a vector, in scene units.
 
-#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
-
 use crate::camera::Camera;
 use crate::edit::bounds::scene_bounds;
 use crate::edit::compound::{body, in_compound, set_body};
@@ -37,7 +35,7 @@ pub fn move_by(scene: &Scene, target: &Target, by: [f64; 3]) -> Result<Edit, Edi
         }
         Target::Material(_) | Target::Settings(_) => {
             let found = format!("{} cannot be moved", target.label(scene));
-            return Err(EditError::new(&found, "Select an object, a light or the camera."));
+            return Err(EditError::new(found, "Select an object, a light or the camera."));
         }
     }
     let label = format!("move {}", target.label(scene));

@@ -1,18 +1,17 @@
 //! Reading of a scene from TOML by its schema. Unknown keys, values of a wrong type and missing keys
 //! are found in the same pass.
 
-use crate::camera;
 use crate::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::format::parts::Part;
 use crate::format::source_map::subject_in;
 use crate::light::{self, LightKind};
-use crate::material;
-use crate::shape;
 use crate::value::{
     Color, DefaultValue, Description, Field, KeyNode, PRESET, ValueType, did_you_mean, integer,
     names, nearest, read_value, sort_by_number, translated, truncated,
 };
-use crate::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
+use crate::{
+    Ambient, Background, FilmSettings, IntegratorSettings, Object, camera, material, shape,
+};
 use std::ops;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};

@@ -195,7 +195,8 @@ pub(super) fn sample_rectangle<L: SimdFloat>(
 pub(super) fn sample_disk<L: SimdFloat>(
     to_center: Vec3<L>,
     axis: impl Fn(usize) -> Vec3<L>,
-    (radius, area): (L, L),
+    radius: L,
+    area: L,
     (u, v): (L, L),
 ) -> PointSample<L> {
     let local = local_of(&axis, to_center);
@@ -376,7 +377,7 @@ impl<S: Float> Emitter<S> {
             Surface::Disk { center, axes, radius } => {
                 let to_center = Vec3::splat(*center) - origin;
                 let (radius, area) = (L::splat(*radius), L::from_f64(self.area));
-                sample_disk(to_center, |i| Vec3::splat(axes[i]), (radius, area), (u, v))
+                sample_disk(to_center, |i| Vec3::splat(axes[i]), radius, area, (u, v))
             }
             Surface::DistantDisk { axis, one_minus_cos } => {
                 let local = warp::cone(u, v, L::splat(*one_minus_cos));

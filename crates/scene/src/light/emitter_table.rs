@@ -123,7 +123,7 @@ impl<S: Float> EmitterTable<S> {
         let axes = [Vec3::new(a, b, c), Vec3::new(d, e, f), Vec3::new(g, h, i)];
         let sides = (lift, radiance.lt(L::zero()));
         let point = match method {
-            Method::Disk => sample_disk(to_center, |i| axes[i], (width, height), numbers),
+            Method::Disk => sample_disk(to_center, |i| axes[i], width, height, numbers),
             Method::Rectangle | Method::Sphere | Method::Single => {
                 sample_rectangle(to_center, |i| axes[i], [width, height], sides, numbers)
             }

@@ -153,8 +153,11 @@ impl<S: Float> MicrofacetDistribution<S> {
     #[inline(always)]
     pub fn shadowing_behind<L: SimdFloat<Scalar = S>>(
         &self,
-        (nh, nv, vh): (L, L, L),
-        (nt, lh): (L, L),
+        nh: L,
+        nv: L,
+        vh: L,
+        nt: L,
+        lh: L,
     ) -> L {
         match self.masking {
             Masking::VCavity => {

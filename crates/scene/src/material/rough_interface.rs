@@ -110,7 +110,7 @@ impl<S: Float> Bsdf<S> {
         let mirrored = n.mul_add(nl * L::from_f64(-2.0), reflected);
         let transmitted = Vec3::select(query.media.thin, mirrored, interface.refracted);
         let (nt, lh) = (-transmitted.dot(n), -transmitted.dot(h));
-        let behind = facets.shadowing_behind((nh, nv, vh), (nt, lh));
+        let behind = facets.shadowing_behind(nh, nv, vh, nt, lh);
         let behind = behind.masked(valid & nt.gt(zero) & lh.gt(zero));
         let passed = L::select(query.same(), one, L::select(query.media.thin, shadowing, behind));
         InterfaceSample {
@@ -215,7 +215,7 @@ impl<S: Float> Bsdf<S> {
         let k_r = self.strength::<L>().masked(query.reflecting);
         let reflected = self.reflection_fresnel.times(|| vh, k_r * shares.reflected * shadowing)
             + Vec3::gray(shares.tir * shadowing);
-        let through = facets.shadowing_behind((nh, nv, vh), (no, oh));
+        let through = facets.shadowing_behind(nh, nv, vh, no, oh);
         let passed = shares.transmitted * L::select(query.media.thin, shadowing, through);
         let value = Vec3::select(behind, Vec3::gray(passed), reflected) * density;
         // At nearly equal indices the half vector of refraction has too few valid digits, because

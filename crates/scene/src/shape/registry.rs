@@ -2,9 +2,9 @@
 
 use crate::shape::{
     Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection,
-    MeshDesc, Plane, Prism, Pyramid,
+    MeshDesc, Plane, Prism, Pyramid, Rectangle, Sphere, TaperedCylinder, Torus, TransformOp, Union,
+    UnitFrustum,
 };
-use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, TransformOp, Union, UnitFrustum};
 use crate::value::{Field, KeyNode, ValidationError, kinds, rounded_to};
 use glam::{DMat3, DVec3};
 use zerkalo_kernel::primitive::Form;

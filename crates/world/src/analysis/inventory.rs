@@ -55,7 +55,7 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
         (ray_types == RayTypes::Shadows && has_lights, "shadows only"),
         (scene.film.filter == Filter::Point, "no anti-aliasing"),
     ]));
-    parts.push(format!("{} precision", world.info.precision));
+    parts.push(format!("{} precision", world.info.precision.name()));
     parts.join(", ")
 }
 

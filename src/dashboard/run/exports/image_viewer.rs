@@ -3,11 +3,10 @@
 use crate::dashboard::Message;
 use crate::dashboard::run::frames::FramePipeline;
 use crossbeam_channel::Sender;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::thread;
 use std::time::Duration;
+use std::{fs, thread};
 use zerkalo_render::film::{Display, box_means};
 use zerkalo_render::image_file::{ReadPicture, png_of_rgb, read_exr, read_png};
 use zerkalo_terminal::cells::{Raster, level, linear};
@@ -34,7 +33,8 @@ pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
 pub fn prepare(
     path: PathBuf,
     display: Display,
-    (viewport, downloads): (ImageViewport, bool),
+    viewport: ImageViewport,
+    downloads: bool,
     results: Sender<Message>,
 ) {
     let (requested, failed) = (path.clone(), results.clone());

@@ -1,9 +1,8 @@
 //! File paths: unused names for exported files, and arguments of scp that copy them.
 
-use std::env;
 use std::fmt::Display;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{env, fs};
 
 /// Largest number in a file name, which bounds the search for an unused one.
 const MOST: u32 = 100_000;

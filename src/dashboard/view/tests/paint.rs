@@ -13,7 +13,7 @@ use std::time::Duration;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::Options;
 use zerkalo_render::film::Display;
-use zerkalo_render::schedule::{Criterion, Settings, Stop};
+use zerkalo_render::schedule::{Settings, Stop};
 use zerkalo_render::session::{Session, Snapshot, State, View};
 use zerkalo_terminal::diff::Encoder;
 use zerkalo_world as world;
@@ -25,8 +25,7 @@ fn rendered(model: &Model, spp: u32) -> Snapshot {
         display: Display::default(),
     };
     let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let settings =
-        Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
+    let settings = Settings::until(stop);
     let mut session = Session::new(2, options, settings).unwrap();
     session.set_view(View {
         raster: Some(model.layout().unwrap().raster),

@@ -2,8 +2,7 @@
 
 use crate::dashboard::model::{Notice, RunningExport, Tone};
 use crate::dashboard::panel_lines::scrolled;
-use crate::dashboard::testing::mirror_room;
-use crate::dashboard::testing::report;
+use crate::dashboard::testing::{mirror_room, report};
 use crate::dashboard::update::update;
 use crate::dashboard::{
     DisplayChannel, Editor, FieldList, Focus, Form, ListCursor, Message, Mode, Model,
@@ -79,9 +78,8 @@ pub fn snapshot(report: Report) -> Snapshot {
 
 fn select(model: &mut Model, object: &str) {
     let scene = Arc::clone(model.scene());
-    let found = (0..scene.objects.len())
-        .map(Target::Object)
-        .find(|subject| subject.label(&scene) == object);
+    let found =
+        (0..scene.objects.len()).map(Target::Object).find(|target| target.label(&scene) == object);
     model.selection = found.unwrap_or_else(|| panic!("{object} in the built-in scene"));
 }
 
@@ -128,7 +126,7 @@ fn adding(model: &mut Model, problem: Option<&str>) {
     let form = Form {
         title: "new sphere".to_string(),
         scene: Arc::new(edit.scene),
-        subject: edit.target,
+        target: edit.target,
         label: edit.label,
         fields: FieldList {
             cursor: 2,

@@ -1,9 +1,8 @@
 //! BVH over the primitives of a scene.
 
-use crate::bvh::Ray;
 use crate::bvh::packet::{PacketBounds, SlabPacket, traverse_packet, with_stack};
 use crate::bvh::single::traverse_rays;
-use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build};
+use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::aggregate::primitive_box::padded;
 use crate::primitive::canonical::Bounds;

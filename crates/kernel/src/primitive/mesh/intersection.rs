@@ -3,12 +3,11 @@
 //! The rays of a coherent packet traverse the BVH together; the rays of other packets traverse it
 //! separately. Both ways test a triangle by the same operations, so that they find the same hits.
 
-use crate::bvh::BVH_WIDTH;
-use crate::bvh::Ray;
 use crate::bvh::packet::{
     PacketBounds, SlabPacket, broadcast, load_wide, traverse_packet, valid_lanes, with_stack,
 };
 use crate::bvh::single::traverse_rays;
+use crate::bvh::{BVH_WIDTH, Ray};
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 use crate::primitive::mesh::{Mesh, TriangleBlock};
 

@@ -206,11 +206,10 @@ fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
         weights.push(weight);
         group_names.push(fields.text()?);
     }
-    let (seed, precision) = (fields.u64()?, fields.text()?);
+    let (seed, precision) = (fields.u64()?, Precision::from_name(&fields.text()?)?);
     let exposure_ev = fields.f64()?;
     let tone = Tone::from_name(&fields.text()?)?;
-    let plain = Precision::from_name(&precision).is_some() && exposure_ev.is_finite();
-    (plain && fields.is_empty()).then(|| FilmFileHeader {
+    (exposure_ev.is_finite() && fields.is_empty()).then(|| FilmFileHeader {
         film: Header { width, height, scales, seed, precision },
         weights: LightWeights { weights },
         group_names,

@@ -44,7 +44,7 @@ impl FilmFileHeader {
             text(self.group_names.get(group).map_or("", String::as_str), out);
         }
         out.extend(film.seed.to_le_bytes());
-        text(&film.precision, out);
+        text(film.precision.name(), out);
         out.extend(self.display.exposure_ev.to_le_bytes());
         text(self.display.tone.name(), out);
     }

@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::FileError;
-use crate::film::testing::TestFilm;
-use crate::film::testing::{Rng, each_tile, film, white};
+use crate::film::testing::{Rng, TestFilm, each_tile, film, white};
 use crate::film::{Film, TILE};
 use std::io::Cursor;
 use std::path::Path;

@@ -8,8 +8,7 @@ mod stops;
 use crate::film::testing::Rng;
 use crate::film::{ByMeasure, TileNoise};
 use crate::schedule::*;
-use crate::wave::JobReport;
-use crate::wave::WaveReport;
+use crate::wave::{JobReport, WaveReport};
 
 /// Value of [`TileNoise::squares`] in all simulated estimates: that of an error spread over very
 /// many pixels.
@@ -178,7 +177,7 @@ impl Model {
 }
 
 fn until(stop: Stop, adaptive: bool) -> Settings {
-    Settings { adaptive, criterion: Criterion::Levels, rays_per_pixel: 0, stop }
+    Settings { adaptive, ..Settings::until(stop) }
 }
 
 fn noise(levels: f64) -> Stop {
