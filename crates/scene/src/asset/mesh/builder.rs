@@ -58,6 +58,9 @@ const VERTEX_BYTES: u64 = 56;
 /// Memory of a triangle in bytes: corners, colour and the counters of equal triangles.
 const TRIANGLE_BYTES: u64 = 32;
 
+/// Memory \[bytes\] that is allocated without a check.
+const UNCHECKED_BYTES: u64 = 1 << 20;
+
 impl<'a> Builder<'a> {
     /// Creates a builder without vertices. `source` is the mesh file, which error messages name.
     pub fn new(source: &'a FileContents) -> Self {
@@ -89,7 +92,7 @@ impl<'a> Builder<'a> {
         let grown_vertices = grown([self.positions.len(), vertices, self.positions.capacity()]);
         let grown_triangles = grown([self.triangles.len(), triangles, self.triangles.capacity()]);
         let bytes = VERTEX_BYTES * grown_vertices + TRIANGLE_BYTES * grown_triangles;
-        if bytes > 0
+        if bytes > UNCHECKED_BYTES
             && let Some(missing) = missing_memory(bytes)
         {
             let found = format!("the mesh of {} vertices or more {missing}", self.positions.len());
