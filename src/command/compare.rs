@@ -7,7 +7,9 @@ use serde::Serialize;
 use std::path::Path;
 use zerkalo_render::export::{display_of_text, noise_of_text};
 use zerkalo_render::film::{ByMeasure, Display};
-use zerkalo_render::image_file::{FileMetadata, png_of_rgb, read_exr, read_png};
+use zerkalo_render::image_file::{
+    FileMetadata, check_picture_memory, png_of_rgb, read_exr, read_png,
+};
 use zerkalo_scene::disk;
 
 /// Width and height of a block \[pixels\], as of a tile.
@@ -88,6 +90,7 @@ impl Picture {
         match metadata.format {
             "PNG" => {
                 let image = read_png(path)?;
+                check_picture_memory((size_of::<[f64; 3]>() * image.pixels().len()) as u64)?;
                 let levels = image.pixels().map(|pixel| pixel.0.map(f64::from)).collect();
                 let size = [image.width() as usize, image.height() as usize];
                 Ok(Self { size, levels, linear: None, noise })

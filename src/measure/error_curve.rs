@@ -31,13 +31,15 @@ const POINT_RATIO: f64 = 0.84;
 
 /// Renders with the settings of `variant`. Ends when the error is at most `levels` 8-bit levels,
 /// `seconds` of tracing have passed, or further samples cannot change the picture. For biased
-/// settings, whose true error does not converge to 0, the error is the estimated one. Returns the
-/// error curve and the render. Fails if a thread cannot be started.
+/// settings, whose true error does not converge to 0, the error is the estimated one. Also ends when
+/// `goes_on`, which is called after each step, returns `false`. Returns the error curve and the
+/// render. Fails if a thread cannot be started.
 pub fn follow(
     variant: &Variant,
     reference: &Reference,
     levels: f64,
     seconds: f64,
+    goes_on: &mut dyn FnMut() -> bool,
 ) -> io::Result<(Vec<Point>, SyncRender)> {
     let mut render = variant.start()?;
     let mut points: Vec<Point> = Vec::new();
@@ -45,7 +47,7 @@ pub fn follow(
     for step in 1.. {
         let done = render.step().is_some();
         let estimate = render.noise_levels();
-        let timed_out = render.seconds >= seconds;
+        let timed_out = render.seconds >= seconds || !goes_on();
         let changed = estimate.is_some_and(|t| t <= POINT_RATIO * last_estimate);
         // Further samples do not change a picture without noise.
         let noiseless = estimate == Some(0.0);
@@ -74,12 +76,19 @@ pub fn follow(
 }
 
 /// Repeats the render of `variant`, and appends its seconds of tracing to each point of the error
-/// curve.
-pub fn repeat(variant: &Variant, points: &mut [Point]) -> io::Result<()> {
+/// curve, until `goes_on` returns `false`.
+pub fn repeat(
+    variant: &Variant,
+    points: &mut [Point],
+    goes_on: &mut dyn FnMut() -> bool,
+) -> io::Result<()> {
     let mut render = variant.start()?;
     let mut step = 0;
     for point in points {
         while step < point.step {
+            if !goes_on() {
+                return Ok(());
+            }
             render.step();
             step += 1;
         }

@@ -46,7 +46,6 @@ pub fn measure(
     let (variants, started) = (plan.variants(scene), Instant::now());
     let mut course = Course { plan, variants: variants.len(), started, report, keep_going: true };
     let default = &variants[0];
-    course.announce("reference", 0);
     let mut warm_up = default.start()?;
     while warm_up.seconds < WARM_UP_SECONDS && warm_up.step().is_none() {}
     let lanes = warm_up.state.world.info().lanes;
@@ -54,7 +53,7 @@ pub fn measure(
     let least = plan.targets.iter().copied().fold(COMPARED_AT, f64::min);
     let reference = match reference {
         Some(given) => given,
-        None => render_reference(default, REFERENCE_SHARE * least, REFERENCE_TIME * plan.seconds)?,
+        None => course.render_reference(default, REFERENCE_SHARE * least)?,
     };
     let idle = |experiment: &&'static Experiment| {
         !variants.iter().any(|variant| variant.experiment == *experiment)
@@ -85,9 +84,30 @@ struct Course<'a> {
 }
 
 impl Course<'_> {
-    fn announce(&mut self, step: &str, done: usize) {
+    /// Reports the progress. Returns `false` if the measurement is to end.
+    fn goes_on(&mut self, step: &str, done: usize) -> bool {
         let total = 1 + self.variants * self.plan.repetitions;
         self.keep_going &= (self.report)(step, done.min(total), total);
+        self.keep_going
+    }
+
+    /// Renders a reference with another random seed, until its noise is at most `levels` 8-bit
+    /// levels or its time has passed.
+    fn render_reference(&mut self, default: &Variant, levels: f64) -> io::Result<Reference> {
+        let seconds = REFERENCE_TIME * self.plan.seconds;
+        let mut other = default.clone();
+        let seed = &mut other.options.sampling.seed;
+        *seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut render = other.start()?;
+        while render.seconds < seconds && render.noise_levels().is_none_or(|noise| noise > levels) {
+            if render.step().is_some() || !self.goes_on("reference", 0) {
+                break;
+            }
+        }
+        let (state, display) = (&render.state, &other.options.display);
+        let mut reference = Reference::of_film(&state.film, &state.weights, display);
+        (reference.spp, reference.seconds) = (render.schedule.spp().mean, render.seconds);
+        Ok(reference)
     }
 
     /// Follows the error curves of all variants: that of the default settings to the noise `least`,
@@ -104,10 +124,11 @@ impl Course<'_> {
             if i > 0 && !self.keep_going {
                 break;
             }
-            self.announce(&variant.name, 1 + i);
             let levels = if i == 0 { least } else { measurement.compared_at };
             let reference = &measurement.reference;
-            let (points, render) = follow(&variant, reference, levels, longest)?;
+            let (points, render) = follow(&variant, reference, levels, longest, &mut || {
+                self.goes_on(&variant.name, 1 + i)
+            })?;
             let bias = || reference.bias(&render.state.film, &render.state.weights);
             let bias = (!variant.experiment.is_unbiased).then(bias);
             let result = Measured { variant, points, bias };
@@ -140,11 +161,9 @@ impl Course<'_> {
                 break;
             }
             for (i, measured) in measurement.measured.iter_mut().enumerate() {
-                self.announce(&measured.variant.name, 1 + self.variants * round + i);
-                if !self.keep_going {
-                    break;
-                }
-                repeat(&measured.variant, &mut measured.points)?;
+                let done = 1 + self.variants * round + i;
+                let Measured { variant, points, .. } = measured;
+                repeat(variant, points, &mut || self.goes_on(&variant.name, done))?;
             }
             round_seconds = self.started.elapsed().as_secs_f64() - passed;
             round += 1;
@@ -173,23 +192,6 @@ fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     let in_time = reached.iter().find(|c| c.seconds <= seconds);
     let end = || default.points.last().map_or(COMPARED_AT, |p| p.errors.rmse_levels);
     in_time.or(reached.last()).map_or_else(end, |c| c.levels)
-}
-
-/// Renders a reference with another random seed, until its noise is at most `levels` 8-bit levels
-/// or `seconds` have passed.
-fn render_reference(default: &Variant, levels: f64, seconds: f64) -> io::Result<Reference> {
-    let mut other = default.clone();
-    other.options.sampling.seed = other.options.sampling.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut render = other.start()?;
-    while render.seconds < seconds && render.noise_levels().is_none_or(|noise| noise > levels) {
-        if render.step().is_some() {
-            break;
-        }
-    }
-    let (state, display) = (&render.state, &other.options.display);
-    let mut reference = Reference::of_film(&state.film, &state.weights, display);
-    (reference.spp, reference.seconds) = (render.schedule.spp().mean, render.seconds);
-    Ok(reference)
 }
 
 #[cfg(test)]

@@ -270,6 +270,20 @@ fn bombs() -> Vec<(&'static str, Vec<u8>, &'static str)> {
              property float z\nelement face {count}\nproperty list uint int vertex_indices\nend_header\n"
         )
     };
+    // Each corner becomes a vertex of its own, since its texture coordinates are new.
+    let face = |i: u32| {
+        let [x, y, z, _] = i.to_le_bytes();
+        [3, 3 * z, 3 * z + 1, 3 * z + 2, 6, x, y, x, y, x, y]
+    };
+    let copies = [
+        &b"ply\nformat binary_little_endian 1.0\nelement vertex 60\nproperty uchar x\n\
+           property uchar y\nproperty uchar z\nelement face 1300000\n\
+           property list uchar uchar vertex_indices\nproperty list uchar uchar texcoord\n\
+           end_header\n"[..],
+        &[0; 180],
+        &(0..1_300_000).flat_map(face).collect::<Vec<_>>(),
+    ]
+    .concat();
     let list = [ply("binary_little_endian", 1).into_bytes(), vec![0; 12], vec![0xff; 4]].concat();
     let gltf = |count: u32, bytes: u32, copies: usize| {
         let repeated = |item: &str| vec![item; copies].join(",");
@@ -315,6 +329,7 @@ fn bombs() -> Vec<(&'static str, Vec<u8>, &'static str)> {
             "more than the file holds",
         ),
         ("list.ply", list, "a list has 4294967295 values"),
+        ("copies.ply", copies, memory),
         ("many.stl", [vec![0; 80], vec![0xff; 4]].concat(), "4294967295 triangles"),
         ("lists.stl", format!("solid\n{}", "facet normal 0 0 1\n".repeat(9)).into(), "lists.stl"),
         ("copies.gltf", gltf(9000, 108_000, 100).into(), memory),
@@ -370,8 +385,13 @@ fn small_files_that_declare_gigabytes_are_refused() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    let message = limited("measure scene.toml --seconds 1 --reference sky.exr");
-    assert!(message.contains("sky.exr: it needs ") && message.contains("expected"), "{message}");
+    for (command, words) in [
+        ("measure scene.toml --seconds 1 --reference sky.exr", "sky.exr: it needs "),
+        ("compare deep.png deep.png", "deep.png: it needs "),
+    ] {
+        let message = limited(command);
+        assert!(message.contains(words) && message.contains("expected"), "{message}");
+    }
 }
 
 /// Checks that a scene or mesh that does not fit into the address space is refused. The address

@@ -189,6 +189,13 @@ impl EffectRunner {
         self.editing.iter().for_each(|editing| editing.files.flush(patience));
     }
 
+    /// Ends the session without waiting, unless it may have pictures to write.
+    pub fn stop_early(&self) {
+        if self.exporting.is_none() {
+            self.session.stop();
+        }
+    }
+
     /// Completes pending writes and ends the threads. Waits until `deadline` for the session and
     /// for pictures that are being written, or without limit if `deadline` is `None`. Returns the
     /// path of the recovery file, or `None` if there are no unsaved edits.

@@ -193,6 +193,7 @@ fn end(
     let deadline = (!matches!(result, Ok(None))).then(|| Instant::now() + ENDED_WITHIN);
     // The autosave thread writes unsaved edits before this thread may block.
     dashboard.effects.flush(Duration::ZERO);
+    dashboard.effects.stop_early();
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
         dashboard.suspend_terminal();
     }
@@ -208,6 +209,8 @@ fn end(
     if let Some(path) = trace {
         dashboard.latency.write(&path)?;
     }
+    // The process ends without the time to free large scenes and pictures.
+    std::mem::forget((dashboard.model, dashboard.frames));
     Ok(ended)
 }
 

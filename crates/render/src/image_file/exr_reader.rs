@@ -7,7 +7,6 @@ use exr::prelude::*;
 use std::io::BufReader;
 use std::path::Path;
 use zerkalo_scene::disk::open_regular;
-use zerkalo_scene::process_memory::missing_memory;
 
 /// Picture from an OpenEXR file.
 pub struct ReadPicture {
@@ -29,13 +28,10 @@ pub(super) fn read_exr_meta(path: &Path) -> Result<MetaData> {
 pub fn read_exr(path: &Path) -> std::result::Result<ReadPicture, String> {
     let meta = read_exr_meta(path).map_err(|e| e.to_string())?;
     let largest = meta.headers.iter().map(|h| h.layer_size.area()).max().unwrap_or(0);
-    check_pixels(largest as u64)?;
     // Samples of all channels, and up to three pictures in double precision.
     let bytes = |h: &Header| h.layer_size.area() as u64 * (72 + 12 * h.channels.list.len() as u64);
     let needed = meta.headers.iter().map(bytes).max().unwrap_or(0);
-    if let Some(missing) = missing_memory(needed) {
-        return Err(format!("it {missing}; expected a smaller picture, or more free memory"));
-    }
+    check_pixels(largest as u64, needed)?;
     let image = read()
         .no_deep_data()
         .largest_resolution_level()

@@ -13,7 +13,9 @@ pub fn read_png(path: &Path) -> Result<RgbImage, String> {
     let decoder = PngDecoder::with_limits(BufReader::new(file), Limits::default());
     let decoder = decoder.map_err(|error| error.to_string())?;
     let (width, height) = decoder.dimensions();
-    check_pixels(u64::from(width) * u64::from(height))?;
+    let pixels = u64::from(width) * u64::from(height);
+    // The levels of the file, and those of the picture.
+    check_pixels(pixels, decoder.total_bytes() + 3 * pixels)?;
     let image = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;
     Ok(image.into_rgb8())
 }

@@ -218,6 +218,12 @@ impl Session {
         self.generations
     }
 
+    /// Ends the thread without waiting for it. Queued tasks are dropped.
+    pub fn stop(&self) {
+        self.send(Command::Quit);
+        self.shared.cancel_first_pass.store(true, Ordering::Release);
+    }
+
     fn send(&self, command: Command) {
         // Sending fails after `Quit`, or after a panic, which `drop` propagates.
         let _ = self.commands.send(command);
@@ -227,8 +233,7 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        self.send(Command::Quit);
-        self.shared.cancel_first_pass.store(true, Ordering::Release);
+        self.stop();
         let end = Instant::now() + END_PATIENCE;
         let is_over = |thread: &JoinHandle<()>| {
             while !thread.is_finished() && Instant::now() < end {

@@ -30,8 +30,9 @@ const GROWTH: [f64; 2] = [1.12, 1.03];
 const GROWTH_PAUSE: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(15)];
 /// Time after the first measurement of the rate in which the capacity of a relay is measured.
 const LEARNING_TIME: Duration = Duration::from_secs(6);
-/// Share of the rate at which frames are sent, so that a relay becomes empty.
-const PACE: f64 = 0.9;
+/// Share of the rate at which frames are sent, so that a relay becomes empty: without a known relay,
+/// and with one. While the buffer of a relay grows, the measured rate is up to a half too high.
+const PACE: [f64; 2] = [0.9, 0.6];
 /// Largest delay of a frame after the time at which it could have been sent, for a connection that
 /// counts as busy in between.
 const LATENESS: Duration = Duration::from_millis(40);
@@ -130,18 +131,23 @@ impl SendQueueEstimate {
     /// Returns the factor by which `rate` grows now. It grows at most once in each `interval`, and
     /// fills a relay only if the user `is_idle`.
     pub fn growth(&mut self, now: Duration, rate: f64, interval: Duration, is_idle: bool) -> f64 {
-        let has_relay = self.capacity > rate * SHORTEST_SAMPLE.as_secs_f64();
-        if now < self.grows_at || has_relay && !is_idle {
+        if now < self.grows_at || self.has_relay(rate) && !is_idle {
             return 1.0;
         }
         self.grows_at = now + interval;
         GROWTH[usize::from(self.settled_rate.is_finite())]
     }
 
+    /// Returns `true` if a relay is known to hold bytes that delay others.
+    fn has_relay(&self, rate: f64) -> bool {
+        self.capacity > rate * SHORTEST_SAMPLE.as_secs_f64()
+    }
+
     /// Returns the time at which the next frame may be sent if the rate is `rate`.
     pub fn free_at(&self, rate: f64) -> Duration {
+        let pace = PACE[usize::from(self.has_relay(rate))];
         let paced =
-            |(at, bytes): &(Duration, f64)| *at + Duration::from_secs_f64(bytes / PACE / rate);
+            |(at, bytes): &(Duration, f64)| *at + Duration::from_secs_f64(bytes / pace / rate);
         self.frames.back().map_or(Duration::ZERO, paced).max(self.transmitted_at(rate))
     }
 
@@ -172,8 +178,8 @@ impl SendQueueEstimate {
         }
         let share = span.as_secs_f64() / CONVINCING_SAMPLE.as_secs_f64();
         let weight = if is_first { 1.0 } else { share.min(1.0) };
-        // The rate is kept if no more than its share `PACE` was sent.
-        let is_kept = (PACE * rate..=rate).contains(&measured);
+        // The rate is kept if no more than its share was sent.
+        let is_kept = (PACE[0] * rate..=rate).contains(&measured);
         let average = ((1.0 - weight) * rate + weight * measured).max(MIN_RATE);
         let settled = if is_kept { rate } else { average };
         self.settled_rate = settled;

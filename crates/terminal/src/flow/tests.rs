@@ -350,6 +350,9 @@ struct Relay {
     rate: f64,
     round_trip: Duration,
     capacity: f64,
+    /// Capacity to which the buffer grows, by eight bytes a millisecond while it is in use. The kernel
+    /// enlarges its receive buffers so.
+    final_capacity: f64,
     /// Ratio of the bytes that a multiplexer sends to those of frames.
     overhead: f64,
     /// Bytes that the relay accepts before it next offers room.
@@ -362,15 +365,28 @@ struct Relay {
 
 impl Relay {
     fn new(rate: f64, round_trip: u64, capacity: f64) -> Self {
-        let round_trip = ms(round_trip);
+        let (round_trip, final_capacity) = (ms(round_trip), capacity);
         let [overhead, window, buffered, queued] = [1.0, 0.0, 0.0, 0.0];
-        Self { rate, round_trip, capacity, overhead, window, buffered, queued, now: 0 }
+        Self {
+            rate,
+            round_trip,
+            capacity,
+            final_capacity,
+            overhead,
+            window,
+            buffered,
+            queued,
+            now: 0,
+        }
     }
 
     /// Advances the simulation by a millisecond, and reports the send queue to `flow`.
     fn step(&mut self, flow: &mut FlowControl) -> Duration {
         self.now += 1;
         self.buffered = (self.buffered - self.rate / 1e3).max(0.0);
+        if self.queued > 0.0 && 2.0 * self.buffered > self.capacity {
+            self.capacity = self.final_capacity.min(self.capacity + 8.0);
+        }
         let room = self.capacity - self.buffered;
         if 2.0 * room >= self.capacity {
             self.window = room;
@@ -468,12 +484,15 @@ fn rate_follows_the_connection() {
 #[test]
 fn keys_do_not_wait_for_bytes_in_a_relay() {
     for (rate, round_trip, limits) in [(32e3, 300, [0.55, 0.8]), (125e3, 100, [0.2, 0.35])] {
-        for (capacity, course) in
-            [2e3, 8e3, 24e3, 48e3, 64e3].into_iter().flat_map(|c| (0..12_u32).map(move |i| (c, i)))
+        let grown = [(40e3, 80e3), (48e3, 96e3), (80e3, 80e3)];
+        let capacities = [2e3, 8e3, 24e3, 48e3, 64e3].map(|c| (c, c)).into_iter().chain(grown);
+        for ((capacity, final_capacity), course) in
+            capacities.flat_map(|c| (0..12_u32).map(move |i| (c, i)))
         {
             let mut flow =
                 FlowControl::new(InitialLink { round_trip: None, ..start(PacingMode::SendQueue) });
             let mut relay = Relay::new(rate, round_trip, capacity);
+            relay.final_capacity = final_capacity;
             relay.overhead = 1.0 + 0.05 * f64::from(course % 4);
             let mut latencies = Vec::new();
             for key in 0..40 {

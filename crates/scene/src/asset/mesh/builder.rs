@@ -6,7 +6,8 @@ use crate::asset::file::FileContents;
 use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, polygon};
 use crate::process_memory::missing_memory;
 use glam::DVec3;
-use std::collections::{HashMap, HashSet};
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet, TryReserveError};
 use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Largest absolute value of a mesh coordinate.
@@ -38,6 +39,8 @@ pub struct Builder<'a> {
     with_uvs: HashMap<(u32, [u32; 2]), u32>,
     triangles: Vec<[u32; 3]>,
     colors: Vec<[f32; 3]>,
+    /// Index in `colors` of each colour, by its bits.
+    color_indices: HashMap<[u32; 3], u16>,
     /// Index in `colors` of the colour of each triangle; 0 for triangles added before the first
     /// call of [`Builder::color`].
     color_of: Vec<u16>,
@@ -55,6 +58,9 @@ const VERTEX_BYTES: u64 = 56;
 /// Memory of a triangle in bytes: corners, colour and the counters of equal triangles.
 const TRIANGLE_BYTES: u64 = 32;
 
+/// Memory \[bytes\] that is allocated without a check.
+const UNCHECKED_BYTES: u64 = 1 << 20;
+
 impl<'a> Builder<'a> {
     /// Creates a builder without vertices. `source` is the mesh file, which error messages name.
     pub fn new(source: &'a FileContents) -> Self {
@@ -67,6 +73,7 @@ impl<'a> Builder<'a> {
             with_uvs: HashMap::new(),
             triangles: Vec::new(),
             colors: Vec::new(),
+            color_indices: HashMap::new(),
             color_of: Vec::new(),
             color: 0,
             notes: Vec::new(),
@@ -85,21 +92,25 @@ impl<'a> Builder<'a> {
         let grown_vertices = grown([self.positions.len(), vertices, self.positions.capacity()]);
         let grown_triangles = grown([self.triangles.len(), triangles, self.triangles.capacity()]);
         let bytes = VERTEX_BYTES * grown_vertices + TRIANGLE_BYTES * grown_triangles;
-        if bytes > 0
+        if bytes > UNCHECKED_BYTES
             && let Some(missing) = missing_memory(bytes)
         {
             let found = format!("the mesh of {} vertices or more {missing}", self.positions.len());
             return Err(self.source.fault(found, "a smaller mesh, or more free memory"));
         }
         let reserved = self.positions.try_reserve(vertices);
-        reserved.and_then(|()| self.triangles.try_reserve(triangles)).map_err(|_| {
-            let found = format!("there is no memory for {triangles} triangles");
-            self.source.fault(found, "a smaller mesh, or more free memory")
-        })
+        let reserved = reserved.and_then(|()| self.triangles.try_reserve(triangles));
+        self.allocated(reserved)
+    }
+
+    /// Converts the result of an allocation.
+    pub fn allocated(&self, result: Result<(), TryReserveError>) -> Result<(), AssetError> {
+        let found = "there is no memory for more vertices and triangles";
+        result.map_err(|_| self.source.fault(found, "a smaller mesh, or more free memory"))
     }
 
     /// Fails if the mesh, with `vertices` and `triangles` added to those it has, exceeds its limits.
-    pub fn check_limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
+    fn check_limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         let checks = [
             (self.positions.len().saturating_add(vertices), MAX_VERTICES, "vertices"),
             (self.triangles.len().saturating_add(triangles), MAX_TRIANGLES, "triangles"),
@@ -155,15 +166,18 @@ impl<'a> Builder<'a> {
     }
 
     /// Returns a vertex like `vertex`, but with the texture coordinates `uv`.
-    pub fn with_uv(&mut self, vertex: u32, uv: [f32; 2]) -> u32 {
+    pub fn with_uv(&mut self, vertex: u32, uv: [f32; 2]) -> Result<u32, AssetError> {
         let key = (vertex, uv.map(f32::to_bits));
         if let Some(known) = self.with_uvs.get(&key) {
-            return *known;
+            return Ok(*known);
         }
+        self.reserve(1, 0)?;
+        let reserved = self.with_uvs.try_reserve(1);
+        self.allocated(reserved)?;
         let i = vertex as usize;
         let copy = self.vertex(self.positions[i], self.normals.get(i).copied(), Some(uv));
         self.with_uvs.insert(key, copy);
-        copy
+        Ok(copy)
     }
 
     /// Returns `true` if [`Builder::color`] was called.
@@ -174,23 +188,25 @@ impl<'a> Builder<'a> {
     /// Sets the linear base colour of the triangles added from now on. Triangles added before the
     /// first call are white.
     pub fn color(&mut self, color: [f32; 3]) -> Result<(), AssetError> {
-        if self.colors.is_empty() && !self.triangles.is_empty() {
-            self.colors.push([1.0; 3]);
-        }
-        let found = self.colors.iter().rposition(|c| *c == color);
-        let index = found.unwrap_or(self.colors.len());
-        self.color = u16::try_from(index).map_err(|_| {
-            self.source.fault("the mesh has more than 65536 different colours", "at most 65536")
-        })?;
-        if found.is_none() {
-            self.colors.push(color);
+        let is_late = self.colors.is_empty() && !self.triangles.is_empty();
+        for color in is_late.then_some([1.0; 3]).into_iter().chain([color]) {
+            let next = u16::try_from(self.colors.len());
+            self.color = match self.color_indices.entry(color.map(f32::to_bits)) {
+                Entry::Occupied(known) => *known.get(),
+                Entry::Vacant(entry) => {
+                    let found = "the mesh has more than 65536 different colours";
+                    let next = next.map_err(|_| self.source.fault(found, "at most 65536"))?;
+                    self.colors.push(color);
+                    *entry.insert(next)
+                }
+            };
         }
         Ok(())
     }
 
     /// Adds a triangle of three vertices.
     pub fn triangle(&mut self, corners: [u32; 3]) -> Result<(), AssetError> {
-        self.check_limits(0, 1)?;
+        self.reserve(0, 1)?;
         self.triangles.push(corners);
         self.color_of.push(self.color);
         Ok(())

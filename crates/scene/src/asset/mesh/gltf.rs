@@ -38,7 +38,7 @@ const KNOWN: [&str; 5] = [
 /// Largest number of items of lists and accessors that are read in all, with repetitions: a few for
 /// each vertex and triangle of the largest mesh. It bounds the time for files that name the same
 /// long lists many times.
-const MAX_ITEMS: u64 = 1 << 30;
+const MAX_ITEMS: u64 = 1 << 29;
 
 /// Estimated memory of a JSON object of the description, whatever the length of its text \[bytes\].
 const OBJECT_BYTES: u64 = 512;
@@ -132,7 +132,7 @@ impl<'a> Gltf<'a> {
     /// Counts items that are read; fails if they exceed [`MAX_ITEMS`].
     fn count(&self, items: usize) -> Result<(), AssetError> {
         self.items_read.set(self.items_read.get().saturating_add(items as u64));
-        let message = "the scene has more than 2^30 numbers and parts";
+        let message = "the scene has more than 2^29 numbers and parts";
         let is_allowed = self.items_read.get() <= MAX_ITEMS;
         is_allowed.then_some(()).ok_or_else(|| self.source.fault(message, "a smaller scene"))
     }
@@ -712,7 +712,7 @@ mod tests {
             ("/accessors/0/type", json!("VEC2"), is_vec2),
             ("/accessors/0/componentType", json!(5130), "a componentType is 5130"),
             ("/accessors/0/count", json!(1e6), "do not lie in their buffer"),
-            ("/accessors/0/count", json!(1e15), "more than 2^30 numbers"),
+            ("/accessors/0/count", json!(1e15), "more than 2^29 numbers"),
             ("/accessors/0/count", json!(0), "do not lie in their buffer"),
             ("/accessors/0/byteOffset", json!(1.5), "do not lie in their buffer"),
             ("/bufferViews/0/byteStride", json!(2), "do not lie in their buffer"),

@@ -155,7 +155,7 @@ impl Parser<'_> {
             let uv = next("texture coordinate", self.uvs.len())?;
             let normal = next("normal", self.normals.len())?;
             let position = position.ok_or_else(|| self.wrong("face is not a list of indices"))?;
-            corners.push(self.vertex((position, uv, normal)));
+            corners.push(self.vertex((position, uv, normal))?);
         }
         self.builder.polygon(&corners)
     }
@@ -178,13 +178,15 @@ impl Parser<'_> {
     }
 
     /// Returns the index of the vertex `corner` in the mesh. Adds the vertex if it is new.
-    fn vertex(&mut self, corner: Corner) -> u32 {
-        *self.vertices.entry(corner).or_insert_with(|| {
+    fn vertex(&mut self, corner: Corner) -> Result<u32, AssetError> {
+        self.builder.reserve(1, 0)?;
+        self.builder.allocated(self.vertices.try_reserve(1))?;
+        Ok(*self.vertices.entry(corner).or_insert_with(|| {
             let (position, uv, normal) = corner;
             let normal = normal.map(|i| self.normals[i].map(|x| x as f32));
             let uv = uv.map(|i| self.uvs[i].map(|x| x as f32));
             self.builder.vertex(self.positions[position], normal, uv)
-        })
+        }))
     }
 
     /// Reads the MTL files that `names` states: one file whose name may have blanks, or several.

@@ -116,7 +116,7 @@ fn add_face(
         let mut corners = corners.collect::<Result<Vec<u32>, _>>()?;
         if !element.is_strip() {
             for (corner, uv) in corners.iter_mut().zip(record[UVS].as_chunks().0) {
-                *corner = builder.with_uv(*corner, uv.map(|x| x as f32));
+                *corner = builder.with_uv(*corner, uv.map(|x| x as f32))?;
             }
             builder.polygon(&corners)?;
             continue;
