@@ -15,12 +15,17 @@ const FEW_SAMPLES: u32 = 64;
 const MANY_SAMPLES: u32 = 512;
 
 /// Files of scenes whose pictures take seconds with [`SAMPLES`] samples.
-const SLOW_SCENES: [&str; 5] = [
+const SLOW_SCENES: [&str; 10] = [
     "torus.toml",
     "gallery-triptych.toml",
     "water-glass.toml",
     "gallery-dusk.toml",
     "gallery-three-balls.toml",
+    "gallery-knot.toml",
+    "gallery-skylight.toml",
+    "gallery-still-life.toml",
+    "gallery-sun-patch.toml",
+    "gallery-water.toml",
 ];
 
 /// Files of scenes with textures or bumps, whose noise is estimated too low with [`SAMPLES`]
