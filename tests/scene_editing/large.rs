@@ -27,7 +27,7 @@ fn cpu_seconds() -> f64 {
 /// changed its scene.
 fn seconds(document: &Document, edit: fn(&mut Scene)) -> f64 {
     let count = document.scene().objects.len();
-    let times = (0..2).map(|_| {
+    let times = (0..3).map(|_| {
         let (mut document, mut scene) = (document.clone(), document.scene().clone());
         edit(&mut scene);
         let start = cpu_seconds();

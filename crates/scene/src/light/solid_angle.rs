@@ -148,7 +148,9 @@ fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) 
         (volume * third.1, below)
     };
     let ((above_b, below_b), (above_d, below_d)) = (triangle(b), triangle(d));
-    let half = (above_b * below_d + below_b * above_d).atan2(below_b * below_d - above_b * above_d);
+    // Rounding may make the sine of pi negative.
+    let sine = (above_b * below_d + below_b * above_d).abs();
+    let half = sine.atan2(below_b * below_d - above_b * above_d);
     half + half
 }
 
