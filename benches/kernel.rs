@@ -134,7 +134,7 @@ fn paths<L: SimdFloat>(c: &mut Criterion) {
     let scales = world.info.scales.clone();
     let mix = LightWeights { weights: vec![[1.0; 3]; scales.len()] };
     let estimator = Estimator::new(&scales, &mix, &Display::default());
-    let precision = "single".to_string();
+    let precision = Precision::Single;
     let header = Header { width: 160, height: 120, scales, seed: 1, precision };
     let mut film = Film::new(header);
     let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first: 0, count: 16 });
