@@ -52,7 +52,7 @@ impl Bench {
         );
         let estimator = Estimator::new(&scales, &mix, &Display::default());
         let [width, height] = size.map(|n| n as usize);
-        let precision = world.info().lanes.to_string();
+        let precision = world.info().precision;
         let film = Film::new(Header { width, height, scales, seed: 1, precision });
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
         Self { world, film, estimator, pool }

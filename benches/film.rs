@@ -9,13 +9,15 @@ use zerkalo_render::film::{
 };
 use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_scene::Tone;
+use zerkalo_world::Precision;
 
 /// Returns a film with `groups` light groups that shows a noisy gradient. Each pixel has two
 /// replicates (halves of the samples) of 64 samples each. The noise is estimated from the
 /// difference between the replicates.
 fn film(width: usize, height: usize, groups: usize) -> Film {
     let scales = vec![2f64.powi(28); groups];
-    let mut film = Film::new(Header { width, height, scales, seed: 1, precision: "single".into() });
+    let precision = Precision::Single;
+    let mut film = Film::new(Header { width, height, scales, seed: 1, precision });
     let all: Vec<_> = (0..film.tile_count()).collect();
     let mut state = 1u64;
     for slot in film.slots(&all) {

@@ -76,8 +76,8 @@ fn renderer<L: SimdFloat>(scene: &Scene) -> impl FnMut() + use<L> {
     let mix = LightWeights { weights: vec![[1.0; 3]; scales.len()] };
     let estimator = Estimator::new(&scales, &mix, &Display::default());
     let [width, height] = scene.film.size.map(|n| n as usize);
-    let mut film =
-        Film::new(Header { width, height, scales, seed: 1, precision: L::NAME.to_string() });
+    let precision = world.info.precision;
+    let mut film = Film::new(Header { width, height, scales, seed: 1, precision });
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
     move || {
         let sampling = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
