@@ -48,10 +48,12 @@ impl ErrorParts {
     /// Returns the sign before the total: it is a lower limit if a part was not measured, and an
     /// upper limit if most of it is the upper limit of cut paths, as after few probes.
     pub fn sign(&self) -> &'static str {
-        match self.largest() {
-            _ if self.is_open() => ">= ",
-            "cut paths" => "<= ",
-            _ => "",
+        if self.is_open() {
+            ">= "
+        } else if self.cut_paths.unwrap_or(0.0) > 0.5 * self.total() {
+            "<= "
+        } else {
+            ""
         }
     }
 
