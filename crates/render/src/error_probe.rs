@@ -166,10 +166,9 @@ impl Packet {
         weights: &LightWeights,
     ) -> (Vec<Pair>, u64) {
         let (mut pairs, mut rays) = (vec![Pair::default(); self.pixels.len()], 0);
+        let Some(culled) = tracer.tile(self.origin, self.extent) else { return (pairs, rays) };
         for replicate in [0, 1] {
-            let pixels = self.pixels.iter().copied();
-            let tile = tracer.tile(replicate, self.origin, self.extent, pixels);
-            let Some(mut tile) = tile else { continue };
+            let mut tile = tracer.pixels(&culled, replicate, self.pixels.iter().copied());
             tile.radiance_shared::<1>(0, |packet, radiance| {
                 for (lane, pixel) in packet.enumerate() {
                     pairs[pixel][replicate] = radiance_of(radiance, lane, weights);

@@ -31,8 +31,8 @@ pub fn run<L: SimdFloat>(
     context: PassContext,
     on_stage: &mut dyn FnMut(&Film),
 ) -> Option<WaveReport> {
-    let PassContext { sampling, pool, cancel } = context;
-    let renderer = TileRenderer::new(world, sampling);
+    let PassContext { pool, cancel, .. } = context;
+    let renderer = TileRenderer::new(world, &context);
     let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
     let mut counts = vec![Counts::default(); tiles.len()];
     let mut previous_step = 0;
@@ -111,7 +111,8 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
                 let pixels = pixels_to_add(tile, steps);
                 let (origin, extent) = (tile[0].0, tile[0].1.extent);
                 let positions = pixels.iter().map(|p| p.position);
-                if let Some(tracer) = self.tracer.tile(0, origin, extent, positions) {
+                if let Some(culled) = self.tracer.tile(origin, extent) {
+                    let tracer = self.tracer.pixels(&culled, 0, positions);
                     self.add_pixels(tile, tracer, &pixels, counts);
                 }
             }

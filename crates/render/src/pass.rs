@@ -2,16 +2,23 @@
 //! jobs are done or cancelled.
 
 use crate::film::{Estimator, Film, SampleFault, TILE, TILE_PIXELS, Tile, TileHandle};
+use crate::schedule::SAMPLE_ALIGNMENT;
 use crate::wave::{Job, JobReport, Wave, WaveReport};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_world::{
-    AnyWorld, CameraTracer, Counts, MAX_BLOCK_PIXELS, MAX_GROUPS, Radiance, TileTracer, World,
+    AnyWorld, CameraTracer, Counts, CulledTile, MAX_BLOCK_PIXELS, MAX_GROUPS, Radiance, TileTracer,
+    World,
 };
 
 const _: () = assert!(TILE_PIXELS <= MAX_BLOCK_PIXELS);
+
+/// Smallest number of samples, over all pixels, that an idle thread takes over from another: a
+/// tenth of a millisecond in simple scenes.
+const SHARED_SAMPLES: usize = 1024;
 
 /// Inputs that all jobs of a pass share.
 #[derive(Clone, Copy)]
@@ -45,8 +52,8 @@ pub fn run_typed<L: SimdFloat>(
     estimator: &Estimator,
     context: PassContext,
 ) -> WaveReport {
-    let PassContext { sampling, pool, cancel } = context;
-    let renderer = TileRenderer::new(world, sampling);
+    let PassContext { pool, cancel, .. } = context;
+    let renderer = TileRenderer::new(world, &context);
     let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
     let slots = film.slots(&tiles);
     let trace = |(slot, job): (TileHandle, &Job)| {
@@ -77,26 +84,36 @@ pub(super) struct TileRenderer<'a, L: SimdFloat> {
     limits: [L; MAX_GROUPS],
     /// Result of [`pixels_of`] for a tile that is entirely inside the picture.
     whole_tile: Vec<u8>,
+    /// `true` if idle threads take over a part of a job.
+    divides: bool,
+}
+
+/// Tile and samples of a job.
+struct Site {
+    culled: CulledTile,
+    /// Column and row of the tile's upper left pixel in the picture.
+    origin: [usize; 2],
+    replicate: usize,
+    /// Indices of the samples of each pixel.
+    samples: Range<u32>,
 }
 
 impl<'a, L: SimdFloat> TileRenderer<'a, L> {
-    pub(super) fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
+    pub(super) fn new(world: &'a World<L>, context: &PassContext) -> Self {
         let mut limits = [L::zero(); MAX_GROUPS];
         for (limit, scale) in limits.iter_mut().zip(&world.info.scales) {
             *limit = L::from_f64((49f64.exp2() / scale).min(L::MAX));
         }
         Self {
-            tracer: world.camera_tracer(sampling),
+            tracer: world.camera_tracer(context.sampling),
             scales: &world.info.scales,
             limits,
             whole_tile: pixels_of([TILE; 2]),
+            divides: context.pool.current_num_threads() > 1,
         }
     }
 
-    /// Traces the samples of `job` and adds them to `tile`, whose first pixel is at `origin`. A
-    /// packet holds `WIDTH` samples of one pixel if its first sample index is a multiple of `WIDTH`
-    /// and at least `WIDTH` samples remain. Otherwise it holds fewer samples of each of several
-    /// pixels.
+    /// Traces the samples of `job` and adds them to `tile`, whose first pixel is at `origin`.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent == [TILE; 2] {
@@ -105,37 +122,77 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
             partial_tile = pixels_of(tile.extent);
             &partial_tile
         };
+        let counts = match self.tracer.tile(origin, tile.extent) {
+            Some(culled) => {
+                // The tile's sums are loaded into the cache while the first samples are traced.
+                tile.prefetch(replicate);
+                let samples = job.first..job.end();
+                self.trace(tile, &Site { culled, origin, replicate, samples }, pixels)
+            }
+            None => Counts::default(),
+        };
+        tile.advance(replicate, job.count);
+        counts
+    }
+
+    /// Traces the samples of `pixels` and adds them to `tile`. If a thread is idle, it traces the
+    /// second half of the pixels into a tile of its own.
+    fn trace(&self, tile: &mut Tile, site: &Site, pixels: &[u8]) -> Counts {
+        let middle = (pixels.len() / 2).next_multiple_of(SAMPLE_ALIGNMENT as usize);
+        if !self.divides || middle * site.samples.len() < SHARED_SAMPLES || middle >= pixels.len() {
+            return self.trace_undivided(tile, site, pixels);
+        }
+        let (first, second) = pixels.split_at(middle);
+        let empty = tile.empty();
+        let (counts, taken) = rayon::join_context(
+            |_| self.trace(tile, site, first),
+            |context| {
+                context.migrated().then(|| {
+                    let mut own = empty.allocated();
+                    let counts = self.trace(&mut own, site, second);
+                    (own, counts)
+                })
+            },
+        );
+        let others = match taken {
+            Some((own, counts)) => {
+                tile.add_tile(&own);
+                counts
+            }
+            None => self.trace(tile, site, second),
+        };
+        Counts { rays: counts.rays + others.rays, glossy: counts.glossy | others.glossy }
+    }
+
+    /// Traces the samples of `pixels` and adds them to `tile`. A packet holds `WIDTH` samples of
+    /// one pixel if its first sample index is a multiple of `WIDTH` and at least `WIDTH` samples
+    /// remain. Otherwise it holds fewer samples of each of several pixels.
+    fn trace_undivided(&self, tile: &mut Tile, site: &Site, pixels: &[u8]) -> Counts {
+        let Site { culled, origin, replicate, samples } = site;
         let position = |pixel: &u8| {
             let pixel = usize::from(*pixel);
             ((origin[0] + pixel % TILE) as u32, (origin[1] + pixel / TILE) as u32)
         };
-        let positions = pixels.iter().map(position);
-        let Some(mut tracer) = self.tracer.tile(replicate, origin, tile.extent, positions) else {
-            tile.advance(replicate, job.count);
-            return Counts::default();
-        };
-        // The tile's sums are loaded into the cache while the first samples are traced.
-        tile.prefetch(replicate);
-        let (mut index, end) = (job.first, job.first + job.count);
-        while index < end {
-            let count = samples_per_packet(index, end, L::WIDTH);
+        let mut tracer = self.tracer.pixels(culled, *replicate, pixels.iter().map(position));
+        let mut index = samples.start;
+        while index < samples.end {
+            let count = samples_per_packet(index, samples.end, L::WIDTH);
             match count {
                 _ if count == L::WIDTH => tracer.radiance(index, |packet, radiance| {
                     self.replace_faults(radiance, |_, fault| tile.count_fault(fault));
                     let pixel = usize::from(pixels[packet.start]);
                     self.sum(radiance, |group, sums| {
-                        tile.add_group(replicate, pixel, group, sums);
+                        tile.add_group(*replicate, pixel, group, sums);
                     });
                 }),
-                1 => self.trace_shared::<1>(tile, &mut tracer, replicate, pixels, index),
-                2 => self.trace_shared::<2>(tile, &mut tracer, replicate, pixels, index),
-                4 => self.trace_shared::<4>(tile, &mut tracer, replicate, pixels, index),
-                8 => self.trace_shared::<8>(tile, &mut tracer, replicate, pixels, index),
+                1 => self.trace_shared::<1>(tile, &mut tracer, *replicate, pixels, index),
+                2 => self.trace_shared::<2>(tile, &mut tracer, *replicate, pixels, index),
+                4 => self.trace_shared::<4>(tile, &mut tracer, *replicate, pixels, index),
+                8 => self.trace_shared::<8>(tile, &mut tracer, *replicate, pixels, index),
                 _ => unreachable!("packets are narrower than 32"),
             }
             index += count as u32;
         }
-        tile.advance(replicate, job.count);
         tracer.counts()
     }
 
@@ -286,8 +343,10 @@ mod tests {
         .unwrap_or_else(|e| panic!("{e}"));
         let world = World::<Single>::new(&scene);
         assert_eq!(world.info.scales.len(), 2);
-        let renderer =
-            TileRenderer::new(&world, &SampleSettings { seed: 0, kind: SamplerKind::Sobol });
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let sampling = &SampleSettings { seed: 0, kind: SamplerKind::Sobol };
+        let cancel = &AtomicBool::new(false);
+        let renderer = TileRenderer::new(&world, &PassContext { sampling, pool: &pool, cancel });
         let limit = 49f64.exp2() / world.info.scales[0];
         for (value, stored) in [
             (f64::NAN, 0.0),

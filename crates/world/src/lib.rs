@@ -17,5 +17,5 @@ pub use integrator::first_hit::FirstHit;
 pub use integrator::path::{Counts, Path, Radiance};
 pub use lights::groups::{LightGroupSource, LightGroups, MAX_GROUPS};
 pub use pixel_block::MAX_BLOCK_PIXELS;
-pub use tile_tracer::{CameraTracer, TileTracer};
+pub use tile_tracer::{CameraTracer, CulledTile, TileTracer};
 pub use world::{World, WorldInfo};

@@ -24,23 +24,26 @@ impl<L: SimdFloat> World<L> {
 }
 
 impl<L: SimdFloat> CameraTracer<'_, L> {
-    /// Creates the tracer of at most [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) `pixels`, pairs
-    /// of column and row, in `replicate` 0 (A) or 1 (B). Culling uses the rectangle of the raster
-    /// with the upper left corner `origin` and the size `extent`, which must contain the pixels.
-    /// Returns `None` if all samples in the rectangle are black.
-    pub fn tile(
-        &self,
-        replicate: usize,
-        origin: [usize; 2],
-        extent: [usize; 2],
-        pixels: impl Iterator<Item = (u32, u32)>,
-    ) -> Option<TileTracer<'_, L>> {
+    /// Returns the culled rectangle of the raster with the upper left corner `origin` and the size
+    /// `extent`. Returns `None` if all samples in it are black.
+    pub fn tile(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<CulledTile> {
         let World { culling, geometry, camera, .. } = self.world;
         let candidates = culling.candidates(geometry, camera, origin, extent);
-        if candidates.as_ref().is_some_and(|candidates| self.world.is_black(candidates)) {
-            return None;
+        match &candidates {
+            Some(candidates) if self.world.is_black(candidates) => None,
+            _ => Some(CulledTile { candidates }),
         }
-        Some(TileTracer { candidates, ..self.scattered(replicate, pixels) })
+    }
+
+    /// Creates the tracer of at most [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) `pixels`, pairs
+    /// of column and row, in `replicate` 0 (A) or 1 (B). `tile` must contain the pixels.
+    pub fn pixels<'a>(
+        &'a self,
+        tile: &'a CulledTile,
+        replicate: usize,
+        pixels: impl Iterator<Item = (u32, u32)>,
+    ) -> TileTracer<'a, L> {
+        TileTracer { candidates: tile.candidates.as_ref(), ..self.scattered(replicate, pixels) }
     }
 
     /// Creates the tracer of `pixels` at any positions in the picture, without culling.
@@ -59,12 +62,18 @@ impl<L: SimdFloat> CameraTracer<'_, L> {
     }
 }
 
+/// Rectangle of the raster with the primitives that its paths must be tested against.
+pub struct CulledTile {
+    /// `None` if all primitives are candidates.
+    candidates: Option<TileCandidates>,
+}
+
 /// Tracer of the samples of up to [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) pixels in
 /// one replicate. It tests rays against the candidate primitives of the tile.
 pub struct TileTracer<'a, L: SimdFloat> {
     world: &'a World<L>,
     sampler: &'a Sampler<L>,
-    candidates: Option<TileCandidates>,
+    candidates: Option<&'a TileCandidates>,
     pixels: PixelBlock<L::Scalar>,
     radiance: Radiance<L>,
 }
@@ -124,8 +133,7 @@ impl<L: SimdFloat> TileTracer<'_, L> {
             let (x, y, _) = disk(u, v);
             path.ray = camera.lens_rays(lens, corner_directions, offset, (x, y));
         }
-        let candidates = self.candidates.as_ref();
-        world.trace(&mut path, candidates, sampler, active, &mut self.radiance);
+        world.trace(&mut path, self.candidates, sampler, active, &mut self.radiance);
     }
 }
 

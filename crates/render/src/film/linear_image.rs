@@ -24,7 +24,7 @@ impl LinearImage {
         let mut known = vec![false; width * height];
         for y in 0..height {
             let start = y * width;
-            film.visit_row(y, |x, sums| {
+            film.visit_row(y, 0..film.header.width, |x, sums| {
                 pixels[start + x] = sums.mean(Replicates::Both, &per_unit).map(|c| c as f32);
                 known[start + x] = sums.count(Replicates::Both) > 0;
             });

@@ -7,6 +7,7 @@ use crate::film::light_weights::{LightWeights, Replicates, Sums};
 use crate::film::noise::{Estimator, Noise};
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::collections::TryReserveError;
+use std::ops::Range;
 use zerkalo_world::Precision;
 
 /// Least size, in bytes, of a film whose tiles are all allocated before the first sample.
@@ -237,18 +238,20 @@ impl Film {
     pub fn row(&self, y: usize, replicates: Replicates, weights: &LightWeights) -> Vec<[f64; 3]> {
         let mut row = vec![[0.0; 3]; self.header.width];
         let per_unit = weights.radiance_per_step(&self.header.scales);
-        self.visit_row(y, |x, sums| row[x] = sums.mean(replicates, &per_unit));
+        self.visit_row(y, 0..self.header.width, |x, sums| {
+            row[x] = sums.mean(replicates, &per_unit)
+        });
         row
     }
 
-    /// Calls `f` with the column and the integer sums of each pixel of row `y`. Tiles without
-    /// samples are skipped.
-    pub fn visit_row(&self, y: usize, mut f: impl FnMut(usize, Sums)) {
-        let columns = self.tile_columns();
-        for column in 0..columns {
-            let Some(tile) = self.tile(y / TILE * columns + column) else { continue };
-            for x in 0..tile.extent[0] {
-                f(column * TILE + x, tile.sums(y % TILE * TILE + x));
+    /// Calls `f` with the column and the integer sums of each pixel of row `y` in `columns`, which
+    /// begin at a multiple of [`TILE`]. Tiles without samples are skipped.
+    pub fn visit_row(&self, y: usize, columns: Range<usize>, mut f: impl FnMut(usize, Sums)) {
+        for left in columns.clone().step_by(TILE) {
+            let index = y / TILE * self.tile_columns() + left / TILE;
+            let Some(tile) = self.tile(index) else { continue };
+            for x in left..columns.end.min(left + TILE) {
+                f(x, tile.sums(y % TILE * TILE + x % TILE));
             }
         }
     }

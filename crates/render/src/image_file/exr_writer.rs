@@ -9,12 +9,12 @@
 //! written again at the end, with sorted attributes and the final metadata.
 
 use crate::film::file::FilmFileHeader;
-use crate::film::{Replicates, Sums};
+use crate::film::{Film, Replicates, Sums};
 use crate::image_file::exr_header::sorted_header;
 use crate::image_file::metadata::padded;
 use crate::image_file::output::{Bands, Depth, WriteSeek, replace_start};
-use exr::block::UncompressedBlock;
 use exr::block::writer::ChunksWriter;
+use exr::block::{BlockIndex, UncompressedBlock};
 use exr::compression::Compression;
 use exr::error::Error;
 use exr::math::{RoundingMode, Vec2};
@@ -24,10 +24,10 @@ use exr::meta::attribute::{
 };
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::meta::{BlockDescription, Headers};
+use rayon::prelude::*;
 use std::io::{self, Cursor};
-use std::ops::Range;
 
-/// Width and height of a tile in pixels. A row of tiles is held in memory.
+/// Width and height of a tile of the file in pixels, multiples of those of a film tile.
 const TILE: [usize; 2] = [64, 16];
 
 /// Writes a picture, one row of tiles after another.
@@ -85,23 +85,24 @@ fn try_encode(
 ) -> Result<(), Error> {
     let headers = headers(picture, channels, &picture.metadata);
     exr::block::write(&mut *sink, headers, true, |meta, writer| {
-        let mut bytes = vec![Vec::new(); channels.len()];
-        let mut compressor = writer.sequential_blocks_compressor(&meta);
-        for (index, block) in exr::block::enumerate_ordered_header_block_indices(&meta.headers) {
-            let Vec2(left, top) = block.pixel_position;
-            if left == 0 {
-                bytes.iter_mut().for_each(Vec::clear);
-                let rows = top..top + block.pixel_size.height();
-                encode_rows(picture, channels, rows, bands, &mut bytes)?;
+        let blocks: Vec<_> =
+            exr::block::enumerate_ordered_header_block_indices(&meta.headers).collect();
+        for row in blocks.chunk_by(|a, b| a.1.pixel_position.y() == b.1.pixel_position.y()) {
+            let [.., (_, last)] = row else { continue };
+            let bottom = last.pixel_position.y() + last.pixel_size.height();
+            for y in last.pixel_position.y()..bottom - 1 {
+                bands.film_with_row(y)?;
             }
-            let descriptions = &meta.headers[0].channels;
-            let block = UncompressedBlock::from_lines(descriptions, block, |line| {
-                let Vec2(x, y) = line.location.position;
-                let bytes = &bytes[line.location.channel];
-                let start = ((y - top) * picture.film.width + x) * 4;
-                line.value.copy_from_slice(&bytes[start..start + line.value.len()]);
-            });
-            compressor.compress_block(index, block)?;
+            let film = bands.film_with_row(bottom - 1)?;
+            let compressed = |(number, index): &(usize, BlockIndex)| {
+                let data = encode_block(picture, channels, film, index);
+                let block = UncompressedBlock { index: *index, data };
+                Ok((*number, block.compress_to_chunk(&meta.headers)?))
+            };
+            let chunks: Result<Vec<_>, Error> = row.par_iter().map(compressed).collect();
+            for (number, chunk) in chunks? {
+                writer.write_chunk(number, chunk)?;
+            }
         }
         Ok(())
     })?;
@@ -201,38 +202,36 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     layers
 }
 
-/// Encodes the pixels of the rows `rows`: appends the values of each of `channels`,
-/// `[row][column]`, to the channel's list in `bytes`.
-fn encode_rows(
+/// Returns the values of the pixels of a tile of the file, `[row][channel][column]`. `film` holds
+/// all of them.
+fn encode_block(
     picture: &FilmFileHeader,
     channels: &[(String, Source)],
-    rows: Range<usize>,
-    bands: &mut dyn Bands,
-    bytes: &mut [Vec<u8>],
-) -> io::Result<()> {
-    for y in rows {
-        let film = bands.film_with_row(y)?;
-        let mixed = &picture.weights.radiance_per_step(&film.header.scales);
-        let start = bytes.first().map_or(0, Vec::len);
-        bytes.iter_mut().for_each(|bytes| bytes.resize(start + film.header.width * 4, 0));
-        film.visit_row(y - film.first_row, |x, sums| {
+    film: &Film,
+    block: &BlockIndex,
+) -> Vec<u8> {
+    let (Vec2(left, top), Vec2(width, height)) = (block.pixel_position, block.pixel_size);
+    let per_unit = &picture.weights.radiance_per_step(&film.header.scales);
+    let mut bytes = vec![0; width * height * channels.len() * 4];
+    for (y, row) in (top..).zip(bytes.chunks_exact_mut(width * channels.len() * 4)) {
+        film.visit_row(y - film.first_row, left..left + width, |x, sums| {
             let means = [Replicates::Both, Replicates::A, Replicates::B]
-                .map(|replicates| sums.mean(replicates, mixed));
-            for ((_, source), bytes) in channels.iter().zip(bytes.iter_mut()) {
+                .map(|replicates| sums.mean(replicates, per_unit));
+            for ((_, source), values) in channels.iter().zip(row.chunks_exact_mut(width * 4)) {
                 let value = match *source {
                     Source::Mixed(replicates, c) => {
                         (means[replicates as usize][c] as f32).to_ne_bytes()
                     }
                     Source::Group(group, c) => {
-                        group_mean(&sums, mixed, 3 * group + c).to_ne_bytes()
+                        group_mean(&sums, per_unit, 3 * group + c).to_ne_bytes()
                     }
                     Source::Count => sums.count(Replicates::Both).to_ne_bytes(),
                 };
-                bytes[start + x * 4..][..4].copy_from_slice(&value);
+                values[(x - left) * 4..][..4].copy_from_slice(&value);
             }
         });
     }
-    Ok(())
+    bytes
 }
 
 /// Returns the mean over a pixel's samples of integer sum `i`, in radiance; 0 without samples. Sums
