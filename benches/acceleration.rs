@@ -164,7 +164,7 @@ fn main() {
         "cone = { base = [0.0, -0.5, 0.0], apex = [0.0, 0.5, 0.0], radius = 0.5 }",
     ];
     let file = |name: &str| {
-        let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name);
+        let path = Path::new(env!("ZERKALO_ROOT")).join("scenes/features").join(name);
         Document::read(&path, Default::default()).unwrap_or_else(|e| panic!("{e}")).scene().clone()
     };
     let scenes = [

@@ -5,7 +5,7 @@
 #     benches/accuracy.sh [KEY...]      only the blocks with these keys
 #
 # A block between `<!-- measured: KEY SCENE OPTIONS -->` and `<!-- end -->` is replaced by the output of
-# `zerkalo measure scenes/SCENE.toml OPTIONS`; the plot goes to docs/images/accuracy-KEY.svg. The block
+# `zerkalo measure scenes/features/SCENE.toml OPTIONS`; the plot goes to docs/images/accuracy-KEY.svg. The block
 # `<!-- extremes -->` of docs/accuracy.md (its key is `extremes`) is replaced by the results that the tests of extremes
 # print; it does not need a quiet machine.
 set -euo pipefail
@@ -43,10 +43,10 @@ while read -r key scene options; do
     wanted "$key" "$@" || continue
     echo "$key: $scene $options" >&2
     # shellcheck disable=SC2086 # Options are words.
-    "$zerkalo" measure "scenes/$scene.toml" $options \
+    "$zerkalo" measure "scenes/features/$scene.toml" $options \
         --plot "docs/images/accuracy-$key.svg" > "$scratch/$key.txt" < /dev/null
     {
-        printf '\n    $ zerkalo measure scenes/%s.toml%s\n\n' "$scene" "${options:+ $options}"
+        printf '\n    $ zerkalo measure scenes/features/%s.toml%s\n\n' "$scene" "${options:+ $options}"
         sed 's/^\(.\)/    \1/' "$scratch/$key.txt"
         printf '\n![Error against time](../../docs/images/accuracy-%s.svg)\n\n' "$key"
     } > "$scratch/$key.md"

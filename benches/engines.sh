@@ -41,7 +41,7 @@ shard_process() {
 
 # plan NAME [SHARDS] [NOISE]
 plan() {
-    "$ZERKALO" plan scenes/gallery-glass.toml --size "$size" --noise "${3:-${NOISE:-0.25}}" --pilot 2 --shards "${2:-8}" \
+    "$ZERKALO" plan scenes/features/glass-solids.toml --size "$size" --noise "${3:-${NOISE:-0.25}}" --pilot 2 --shards "${2:-8}" \
         -o "$work/$1.plan" --base "$work/$1-0.zk"
 }
 
@@ -51,7 +51,7 @@ equal() {
 
 echo "$(uname -sr), $(nproc) cores, zerkalo $("$ZERKALO" --version | cut -d' ' -f2)"
 plan one
-"$ZERKALO" render scenes/gallery-glass.toml --plan "$work/one.plan" -o "$work/one.png" 2>/dev/null
+"$ZERKALO" render scenes/features/glass-solids.toml --plan "$work/one.plan" -o "$work/one.png" 2>/dev/null
 say "one run of the plan is done"
 
 wait_for_jobs() {
@@ -70,7 +70,7 @@ gnu_parallel() {
     plan job > /dev/null
     printf '1/:\n1/:\n1/:\n' > "$work/hosts"
     say "GNU parallel $(parallel --version | head -n 1 | cut -d' ' -f3): 8 shards, three at a time"
-    RENDER_OPTIONS="--threads 1" examples/many-machines/parallel.sh scenes/gallery-glass.toml "$work/job.plan" "$work/hosts" "$work/job.png" \
+    RENDER_OPTIONS="--threads 1" examples/many-machines/parallel.sh scenes/features/glass-solids.toml "$work/job.plan" "$work/hosts" "$work/job.png" \
         > "$work/parallel.log" 2>&1 &
     local engine=$! victim
     victim="$(shard_process 2 job)"
@@ -137,7 +137,7 @@ slurm() {
     say "Slurm $(slurmctld -V | cut -d' ' -f2): $(sinfo -h -o '%D nodes %t')"
     plan slurm > /dev/null
     local jobs array victim shard
-    jobs="$(examples/many-machines/slurm.sh scenes/gallery-glass.toml "$work/slurm.plan" "$work/slurm.png")"
+    jobs="$(examples/many-machines/slurm.sh scenes/features/glass-solids.toml "$work/slurm.plan" "$work/slurm.png")"
     say "$jobs"
     array="${jobs#shards: }" array="${array%%,*}"
 
@@ -178,11 +178,11 @@ slurm() {
     # One shard of some three minutes of processor time. Slurm ends tasks up to a minute after their limit.
     plan limit 1 "${LIMIT_NOISE:-0.12}" > /dev/null
     say "a time limit of two minutes"
-    SBATCH_OPTIONS="--time=2" examples/many-machines/slurm.sh scenes/gallery-glass.toml "$work/limit.plan" "$work/limit.png"
+    SBATCH_OPTIONS="--time=2" examples/many-machines/slurm.sh scenes/features/glass-solids.toml "$work/limit.plan" "$work/limit.png"
     wait_for_jobs
     grep 'exit status' "$work/limit-1.log" | sed 's/^/        /'
     grep -q 'exit status 143' "$work/limit-1.log" || { echo "the shard was not stopped at its limit" >&2; exit 1; }
-    "$ZERKALO" render scenes/gallery-glass.toml --plan "$work/limit.plan" -o "$work/one.png" 2>/dev/null
+    "$ZERKALO" render scenes/features/glass-solids.toml --plan "$work/limit.plan" -o "$work/one.png" 2>/dev/null
     equal limit
 }
 

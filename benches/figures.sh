@@ -8,7 +8,7 @@ runs="${1:-5}"
 zerkalo="${ZERKALO:-target/release/zerkalo}"
 scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
-physical=scenes/mirror-room-physical.toml
+physical=scenes/features/mirror-room-physical.toml
 room=scenes/mirror-room.toml
 
 # value KEY FILE: a number from a --stats file.

@@ -27,7 +27,7 @@ use zerkalo_world::{AnyWorld, Options, Precision, World};
 const SAMPLING: SampleSettings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
 
 fn physical() -> Scene {
-    let text = include_str!("../scenes/mirror-room-physical.toml");
+    let text = include_str!("../scenes/features/mirror-room-physical.toml");
     Scene::parse(text, "mirror-room-physical.toml").expect("a shipped scene")
 }
 

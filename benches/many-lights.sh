@@ -5,7 +5,7 @@
 #     cargo build --release
 #     benches/many-lights.sh [N...] > benches/runs/DATE-many-lights.txt
 #
-# LAMPS=1: instead, rectangle lamps in the ceiling of the box room of scenes/rectangle-light.toml.
+# LAMPS=1: instead, rectangle lamps in the ceiling of the box room of scenes/features/rectangle-light.toml.
 # Prints the processor time to a linear RMSE of 0.00068 (adaptive), and processor time times squared error of uniform
 # pictures, the mean of SEEDS runs (3), as multiples of the first N. ZERKALO names a program that has been built already.
 set -euo pipefail
@@ -31,7 +31,7 @@ lamps() {
         }
         /^\[materials/ { skip = 0 }
         !skip { print }
-    ' scenes/rectangle-light.toml
+    ' scenes/features/rectangle-light.toml
 }
 
 # Prints the physical mirror room with $1 lights, in a square of rows at the height of its lamp.
@@ -48,7 +48,7 @@ scene() {
         }
         /^\[materials/ { skip = 0 }
         !skip { print }
-    ' scenes/mirror-room-physical.toml
+    ' scenes/features/mirror-room-physical.toml
 }
 
 # Renders $work/room.toml with the given options. Prints processor seconds, samples per pixel and linear RMSE.

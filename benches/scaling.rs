@@ -22,7 +22,7 @@
 use std::collections::BinaryHeap;
 
 /// Parameters of the simulation, measured or assumed. Their defaults are those of a render of the
-/// scene gallery-glass with 3840x2160 pixels, traced to a noise of 0.25 8-bit levels.
+/// scene glass-solids with 3840x2160 pixels, traced to a noise of 0.25 8-bit levels.
 #[derive(Clone, Copy, Debug)]
 struct Setup {
     /// Seconds that the whole picture takes on one machine.

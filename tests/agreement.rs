@@ -17,7 +17,7 @@ const MANY_SAMPLES: u32 = 512;
 /// Files of scenes whose pictures take seconds with [`SAMPLES`] samples.
 const SLOW_SCENES: [&str; 10] = [
     "torus.toml",
-    "gallery-triptych.toml",
+    "triptych.toml",
     "water-glass.toml",
     "gallery-dusk.toml",
     "gallery-three-balls.toml",
@@ -43,7 +43,7 @@ fn samples_of(name: &str) -> u32 {
 }
 
 /// Files of scenes that the reference tracer must support, so that they are compared.
-const GALLERY: &str = "mirror-room.toml gallery-triptych.toml gallery-metals.toml gallery-glass.toml \
+const GALLERY: &str = "mirror-room.toml triptych.toml gallery-metals.toml glass-solids.toml \
      rough-glass.toml absorbing-glass.toml texture-checker.toml texture-image.toml \
      texture-mapping.toml texture-uv.toml bump.toml depth-of-field.toml sphere-light.toml \
      rectangle-light.toml disk-light.toml sun.toml environment.toml emissive-objects.toml \
@@ -243,8 +243,8 @@ fn diffuse_bounces_agree_with_reference_tracer() {
         ("mirror-room.toml", 1, 16, true),
         ("mirror-room.toml", 3, 2, true),
         ("mirror-room.toml", 2, 16, false),
-        ("gallery-glass.toml", 2, 5, true),
-        ("gallery-glass.toml", 2, 5, false),
+        ("glass-solids.toml", 2, 5, true),
+        ("glass-solids.toml", 2, 5, false),
         ("round-room.toml", 3, 3, true),
         ("texture-checker.toml", 2, 4, true),
         ("bump.toml", 2, 0, true),
@@ -282,7 +282,7 @@ fn lenses_agree_with_reference_tracer() {
         ("mirror-room.toml", number(0.05), None, 0.0),
         ("mirror-room.toml", Aperture::Radius(4.0), Some(Focus::Distance(6.0)), 0.0),
         ("mirror-room.toml", Aperture::Radius(0.3), Some(Focus::Point([0.0, 0.0, 2.0])), 2.5),
-        ("gallery-glass.toml", Aperture::Radius(0.1), None, 0.0),
+        ("glass-solids.toml", Aperture::Radius(0.1), None, 0.0),
         ("reflecting-tracks-lit.toml", Aperture::Radius(1.0), Some(Focus::Distance(5.0)), 0.0),
     ] {
         let mut scene = small(shipped(name));

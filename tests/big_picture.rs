@@ -46,7 +46,7 @@ fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 
 }
 
 /// Compares 16 columns (262,144 pixels) of the picture in the file `ZERKALO_PICTURE`. `zerkalo
-/// render scenes/mirror-room-physical.toml --size 16384x16384 --spp 8 --uniform` writes this file.
+/// render scenes/features/mirror-room-physical.toml --size 16384x16384 --spp 8 --uniform` writes this file.
 #[test]
 #[ignore = "needs the picture at ZERKALO_PICTURE, see docs/big-pictures.md"]
 fn big_picture_has_the_pixels_of_single_rays() {

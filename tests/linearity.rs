@@ -176,7 +176,7 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
     // extents.toml, and changes the picture by 2.7e-8 of its light.
     //
     // A sample close to an edge may fall on its other side after the translation. This happens to
-    // one sample in ten thousand near the horizon of the checked floor of gallery-glass.toml. One
+    // one sample in ten thousand near the horizon of the checked floor of glass-solids.toml. One
     // in 500 pixels of this scene may therefore differ, by at most one sample each. It happens in
     // no other scene.
     //
@@ -193,7 +193,7 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
                 .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum())
                 .collect();
             apart.sort_by(f64::total_cmp);
-            let edges = if name == "gallery-glass.toml" { apart.len() / 500 } else { 0 };
+            let edges = if name == "glass-solids.toml" { apart.len() / 500 } else { 0 };
             let (most, flipped) = apart.split_at(apart.len() - edges);
             let sum = here.iter().sum::<f64>();
             // The polished knot spreads adjacent rays: 2.9e-8.

@@ -43,13 +43,13 @@ fn golden_pictures_do_not_depend_on_lane_count() {
         ("mirror-room-physical", "--rmse 0.002"),
         ("mirror-room-physical", "--rmse 0.002 --precision double"),
         ("reflecting-tracks", "--noise 2"),
-        ("gallery-glass", "--spp 45"),
+        ("glass-solids", "--spp 45"),
         ("rays-per-pixel", "--spp 50 --uniform"),
         ("many-lights", "--rmse 0.004"),
     ] {
-        let scene = format!("{}/scenes/{name}.toml", env!("ZERKALO_ROOT"));
+        let scene = shipped_path(&format!("{name}.toml"));
         let mut command = Command::new(env!("CARGO_BIN_EXE_zerkalo"));
-        command.args(["render", &scene, "--size", "100x70", "--bits", "16"]);
+        command.arg("render").arg(&scene).args(["--size", "100x70", "--bits", "16"]);
         let run = command.args(options.split(' ')).arg("-o").arg(&path).output().unwrap();
         assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
         let image = PngImage::open(&path).unwrap();

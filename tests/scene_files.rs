@@ -56,7 +56,7 @@ const WARNED: &[(&str, &str)] = &[
 
 #[test]
 fn every_scene_reads_and_has_a_title_comment() {
-    let paths = files("scenes");
+    let paths = [files("scenes"), files("scenes/features")].concat();
     assert!(paths.len() >= 30, "only {} scenes", paths.len());
     for path in paths {
         let document = Document::read(&path, Default::default()).unwrap_or_else(|e| panic!("{e}"));
@@ -73,7 +73,7 @@ fn every_scene_reads_and_has_a_title_comment() {
         }
         // The comments refer only to scenes that exist.
         for word in text.split('`').filter(|w| w.ends_with(".toml")) {
-            assert!(Path::new("scenes").join(word).exists(), "{} names {word}", path.display());
+            assert!(path.with_file_name(word).exists(), "{} names {word}", path.display());
         }
     }
 }
@@ -95,7 +95,7 @@ fn corners(scene: &Scene, name: &str) -> Vec<[f64; 3]> {
 
 #[test]
 fn mirror_room_has_published_coordinates() {
-    let physical = Scene::read("scenes/mirror-room-physical.toml".as_ref()).unwrap();
+    let physical = Scene::read("scenes/features/mirror-room-physical.toml".as_ref()).unwrap();
     let beautiful = Scene::read("scenes/mirror-room.toml".as_ref()).unwrap();
     let shapes = |scene: &Scene| scene.objects.iter().map(|o| o.shape.clone()).collect::<Vec<_>>();
     assert_eq!(shapes(&physical), shapes(&beautiful));
@@ -165,7 +165,7 @@ fn endless_device_is_read_up_to_the_size_limit() {
 
 #[test]
 fn reflecting_tracks_follow_their_formula() {
-    for file in ["scenes/reflecting-tracks.toml", "scenes/reflecting-tracks-lit.toml"] {
+    for file in ["scenes/features/reflecting-tracks.toml", "scenes/features/reflecting-tracks-lit.toml"] {
         let scene = Scene::read(file.as_ref()).unwrap();
         assert_eq!(scene.objects.len(), 401);
         let mirror = &scene.materials[&scene.objects[0].material];

@@ -10,8 +10,7 @@ use zerkalo_render::{Options, SyncRender};
 const THREADS: usize = 2;
 
 fn scene(name: &str, size: Option<[u32; 2]>) -> Scene {
-    let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(format!("{name}.toml"));
-    let mut scene = Scene::read(&path).unwrap_or_else(|e| panic!("{e}"));
+    let mut scene = shipped(&format!("{name}.toml"));
     scene.film.size = size.unwrap_or(scene.film.size);
     scene
 }
@@ -164,8 +163,8 @@ fn planned_noise_is_near_the_target() {
 #[test]
 #[ignore = "takes minutes"]
 fn planned_runs_of_eight_shards_meet_their_target() {
-    for name in ["mirror-room", "reflecting-tracks", "gallery-glass"] {
-        for seed in 0..if name == "gallery-glass" { 1 } else { 3 } {
+    for name in ["mirror-room", "reflecting-tracks", "glass-solids"] {
+        for seed in 0..if name == "glass-solids" { 1 } else { 3 } {
             let result = planned(name, None, seed, 0.25);
             assert!(result.noise <= 1.1, "{name}, seed {seed}: {}", result.noise);
             assert!(result.rays <= 1.1, "{name}, seed {seed}: {}", result.rays);

@@ -16,6 +16,9 @@ use zerkalo_scene::disk;
 const BLOCK: usize = 16;
 /// Relative accuracy of the noise in the metadata.
 const NOISE_ACCURACY: f64 = 0.1;
+/// Number of standard errors by which the mean difference of a block may differ from 0. The
+/// probability of more is below 1e-5 for a picture of 3840x2160 pixels and normal noise.
+const MAX_SHIFT: f64 = 7.0;
 /// Ends of the colours of the difference picture, as a multiple of the RMSE.
 const COLOR_RANGE: f64 = 3.0;
 
@@ -105,21 +108,44 @@ impl Picture {
     }
 }
 
+/// Sums over the pixels of a block. A shift is the mean difference of a pixel's three channels.
+#[derive(Clone, Copy, Default)]
+struct Differences {
+    squares: f64,
+    shifts: f64,
+    squared_shifts: f64,
+    pixels: f64,
+}
+
+impl Differences {
+    /// Returns the mean shift in standard errors. Noise has the mean 0, a difference between scenes
+    /// has not. The standard deviation of a pixel is that in the block, and at least `noise`, that
+    /// of the picture: a block may lack the few bright samples that its noise consists of.
+    fn shift_errors(&self, noise: f64) -> f64 {
+        let mean = self.shifts / self.pixels;
+        let variance = (self.squared_shifts / self.pixels - mean * mean).max(noise * noise);
+        mean.abs() * (self.pixels / variance.max(f64::MIN_POSITIVE)).sqrt()
+    }
+}
+
 /// Compares two pictures of equal size.
 fn compare(a: &Picture, b: &Picture) -> Compared {
     let [width, height] = a.size;
     let columns = width.div_ceil(BLOCK);
-    // Sum of squared differences and number of pixels of each block.
-    let mut blocks = vec![(0.0, 0.0); columns * height.div_ceil(BLOCK)];
+    let mut blocks = vec![Differences::default(); columns * height.div_ceil(BLOCK)];
     for (i, (a, b)) in a.levels.iter().zip(&b.levels).enumerate() {
         let block = &mut blocks[i / width / BLOCK * columns + i % width / BLOCK];
-        *block = (block.0 + squared(a, b), block.1 + 1.0);
+        let shift = (0..3).map(|c| b[c] - a[c]).sum::<f64>() / 3.0;
+        block.squares += squared(a, b);
+        block.shifts += shift;
+        block.squared_shifts += shift * shift;
+        block.pixels += 1.0;
     }
-    let mean = |(sum, pixels): &(f64, f64)| sum / (3.0 * pixels);
+    let mean = |block: &Differences| block.squares / (3.0 * block.pixels);
     let largest = (0..blocks.len()).max_by(|a, b| mean(&blocks[*a]).total_cmp(&mean(&blocks[*b])));
     let largest = largest.unwrap_or(0);
     let pixels = a.levels.len() as f64;
-    let square = blocks.iter().map(|(sum, _)| sum).sum::<f64>() / (3.0 * pixels);
+    let square = blocks.iter().map(|block| block.squares).sum::<f64>() / (3.0 * pixels);
     let linear = a.linear.as_ref().zip(b.linear.as_ref()).map(|(a, b)| {
         let sum: f64 = a.iter().zip(b).map(|(a, b)| squared(a, b)).sum();
         (sum / (3.0 * pixels)).sqrt()
@@ -137,7 +163,10 @@ fn compare(a: &Picture, b: &Picture) -> Compared {
         rmse_linear: linear,
         noise_levels,
         noise_linear: noises.filter(|_| linear.is_some()).map(|(a, b)| a.linear.hypot(b.linear)),
-        agree: noise_levels.map(|noise| square <= most(noise)),
+        agree: noise_levels.map(|noise| {
+            let shifted = |block: &Differences| block.shift_errors(noise) > MAX_SHIFT;
+            square <= most(noise) && !blocks.iter().any(shifted)
+        }),
         largest_block: Block {
             x: largest % columns * BLOCK,
             y: largest / columns * BLOCK,
@@ -167,6 +196,9 @@ impl Compared {
         let noise = match (self.noise_levels, self.agree) {
             (Some(noise), Some(true)) => {
                 format!("the noise of both explains {noise:.3}: the pictures agree")
+            }
+            (Some(noise), _) if self.rmse_levels <= noise => {
+                format!("the noise of both explains {noise:.3}, but not the shift of whole blocks")
             }
             (Some(noise), _) => {
                 let rest = (self.rmse_levels.powi(2) - noise * noise).max(0.0).sqrt();

@@ -15,8 +15,8 @@ pub const BUILT_IN: [(&str, &str); 6] = [
     ("mirror-room", include_str!("../../scenes/mirror-room.toml")),
     ("gallery-metals", include_str!("../../scenes/gallery-metals.toml")),
     ("gallery-glass", include_str!("../../scenes/gallery-glass.toml")),
-    ("gallery-triptych", include_str!("../../scenes/gallery-triptych.toml")),
-    ("water-glass", include_str!("../../scenes/water-glass.toml")),
+    ("gallery-dusk", include_str!("../../scenes/gallery-dusk.toml")),
+    ("gallery-water", include_str!("../../scenes/gallery-water.toml")),
 ];
 
 #[derive(Clone, Debug, PartialEq, Eq)]

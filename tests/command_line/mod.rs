@@ -235,7 +235,7 @@ fn stats_file_has_every_key() {
 #[test]
 fn stats_and_check_name_the_same_biases() {
     let desk = Desk::new();
-    let mirrors = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/facing-mirrors.toml");
+    let mirrors = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/features/facing-mirrors.toml");
     fs::copy(mirrors, desk.path("scene.toml")).unwrap();
     let check = desk.run(&["check", "scene.toml"]);
     let named: Vec<_> =

@@ -160,7 +160,7 @@ fn stories_of_the_shell() {
 #[ignore = "five minutes, idle machine: cargo test --release --test program deadlines -- --ignored"]
 fn deadlines_of_shipped_scenes_are_kept() {
     let desk = Desk::new();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/features");
     let entries = fs::read_dir(folder).unwrap().flatten().map(|entry| entry.path());
     let mut scenes: Vec<_> =
         entries.filter(|path| path.extension() == Some("toml".as_ref())).collect();

@@ -75,7 +75,7 @@ pub fn scene(seed: u64) -> Sample {
             scene
         }
         _ => {
-            let name = ["gallery-glass.toml", "glass.toml", "water-glass.toml"];
+            let name = ["glass-solids.toml", "glass.toml", "water-glass.toml"];
             let mut scene = sized(shipped(name[whole(&mut n, 0, 2) as usize]), size);
             scene.camera.eye[1] += n.between(0.0, 0.3);
             scene

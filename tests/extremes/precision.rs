@@ -315,7 +315,7 @@ fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() 
 fn shipped_scenes_stay_in_single_precision() {
     // Rounding diverts some paths in glass and between mirrors. The result is noise, not an error,
     // and falls with the number of samples. With 96x54 pixels, single and double precision differ
-    // in gallery-glass.toml by 0.24, 0.13, 0.066 and 0.035 levels at 16, 64, 256 and 1024 samples
+    // in glass-solids.toml by 0.24, 0.13, 0.066 and 0.035 levels at 16, 64, 256 and 1024 samples
     // per pixel, and in emissive-objects.toml by 0.41, 0.16 and 0.08 levels at 64, 256 and 1024.
     let mut wrong = Vec::new();
     let mut worst = (0.0, String::new());

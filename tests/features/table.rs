@@ -52,7 +52,7 @@ fn every_row_has_scene_test_source_and_mutation() {
         assert!(description.len() > 10, "{row} has no description");
         assert!(!quoted(scenes).is_empty(), "{row} has no scene");
         for scene in quoted(scenes) {
-            assert!(root().join("scenes").join(scene).exists(), "{row}: no scene {scene}");
+            assert!(shipped_path(scene).exists(), "{row}: no scene {scene}");
         }
         let [test] = quoted(test)[..] else { panic!("{row}: not one test") };
         let prefix = row.to_lowercase() + "_";

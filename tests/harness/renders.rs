@@ -5,18 +5,27 @@ use std::ops::Deref;
 use zerkalo_render as render;
 use zerkalo_render::wave::{Job, Wave, WaveReport};
 
-pub fn shipped(name: &str) -> Scene {
-    let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name);
-    Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
+/// Folders of scene files.
+const FOLDERS: [&str; 2] = ["scenes", "scenes/features"];
+
+/// Returns the path of the scene file `name`.
+pub fn shipped_path(name: &str) -> PathBuf {
+    let folders = FOLDERS.map(|folder| Path::new(env!("ZERKALO_ROOT")).join(folder).join(name));
+    folders.into_iter().find(|path| path.exists()).unwrap_or_else(|| panic!("no scene {name}"))
 }
 
-/// Returns every scene of the folder `scenes` with its file name, sorted by name.
+pub fn shipped(name: &str) -> Scene {
+    Scene::read(&shipped_path(name)).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Returns every scene of the folders of scenes with its file name, sorted by name.
 pub fn all_shipped() -> Vec<(String, Scene)> {
-    let folder = Path::new(env!("ZERKALO_ROOT")).join("scenes");
-    let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let folders = FOLDERS.map(|folder| Path::new(env!("ZERKALO_ROOT")).join(folder));
+    let files = folders.iter().flat_map(|folder| fs::read_dir(folder).unwrap());
+    let files = files.map(|entry| entry.unwrap().path());
     let mut paths: Vec<PathBuf> =
         files.filter(|p| p.extension().is_some_and(|e| e == "toml")).collect();
-    paths.sort();
+    paths.sort_by_key(|path| path.file_name().map(|name| name.to_owned()));
     assert!(paths.len() >= 30, "only {} scenes", paths.len());
     let name = |path: &Path| path.file_name().unwrap().to_str().unwrap().to_string();
     paths.iter().map(|path| (name(path), shipped(&name(path)))).collect()

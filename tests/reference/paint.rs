@@ -18,7 +18,7 @@ const ASIDE: f64 = 1e-6;
 /// distance from both ends. The ends of a cylinder thus show the texture next to their rims.
 const RIM: f64 = 1.0 / 16384.0;
 
-/// Image file of the folder `scenes`. The lowest row is the first.
+/// Image file of the folder `scenes/textures`. The lowest row is the first.
 pub struct Pixels {
     /// Number of columns and of rows.
     pub size: DVec2,
@@ -27,9 +27,9 @@ pub struct Pixels {
 }
 
 impl Pixels {
-    /// Opens an image by the name that a shipped scene uses.
+    /// Opens an image by the name that a scene of `scenes/features` uses.
     pub fn open(file: &str) -> Result<Self, String> {
-        let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(file);
+        let path = Path::new(env!("ZERKALO_ROOT")).join("scenes/features").join(file);
         let image = PngImage::open(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         assert_eq!(image.depth, BitDepth::Eight, "{}", path.display());
         let code = |level: u8| f64::from(f32::from(level) / 255.0);

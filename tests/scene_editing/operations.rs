@@ -7,7 +7,7 @@ use std::cell::RefCell;
 use zerkalo_scene::History;
 use zerkalo_scene::edit::{Edit, EditError, Widget};
 
-const TRANSFORMS: &str = include_str!("../../scenes/transform.toml");
+const TRANSFORMS: &str = include_str!("../../scenes/features/transform.toml");
 
 /// Random numbers that select an edit operation, its target, its parameter and its amount.
 type Act = (u8, usize, usize, f64);

@@ -114,7 +114,7 @@ fn scene_is_large(desk: &Desk) -> bool {
 
 #[test]
 fn random_events_keep_model_valid() {
-    let physical = include_str!("../../scenes/mirror-room-physical.toml");
+    let physical = include_str!("../../scenes/features/mirror-room-physical.toml");
     let mut fired = HashSet::new();
     play("room", &(ROOM.to_string() + compounds::GOBLET), 1, &mut fired);
     play("built in", MIRROR_ROOM, 2, &mut fired);

@@ -356,7 +356,7 @@ mod tests {
     /// Checks the bound of cut paths between two mirrors that face each other.
     #[test]
     fn probe_bounds_cut_paths() {
-        let text = include_str!("../../../scenes/facing-mirrors.toml");
+        let text = include_str!("../../../scenes/features/facing-mirrors.toml");
         let mut scene = Scene::parse(text, "facing-mirrors.toml").unwrap();
         scene.film.size = [64, 48];
         scene.materials.values_mut().for_each(|m| m.reflection = m.reflection.min(0.7));

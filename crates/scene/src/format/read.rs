@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn parts_of_a_file_give_the_scene_and_the_errors_of_the_whole() {
         let root = Path::new(env!("ZERKALO_ROOT"));
-        for folder in ["scenes", "tests/bad-scenes"] {
+        for folder in ["scenes/features", "tests/bad-scenes"] {
             let mut count = 0;
             for entry in fs::read_dir(root.join(folder)).unwrap() {
                 let path = entry.unwrap().path();
