@@ -131,7 +131,10 @@ fn main() {
     }
     println!("samples");
     for name in ["mirror-room-physical", "transmission", "water-glass", "reflecting-tracks"] {
-        let path = Path::new(env!("ZERKALO_ROOT")).join("scenes/features").join(name).with_extension("toml");
+        let path = Path::new(env!("ZERKALO_ROOT"))
+            .join("scenes/features")
+            .join(name)
+            .with_extension("toml");
         let mut scene = Document::read(&path, Default::default())
             .unwrap_or_else(|e| panic!("{e}"))
             .scene()

@@ -165,7 +165,9 @@ fn endless_device_is_read_up_to_the_size_limit() {
 
 #[test]
 fn reflecting_tracks_follow_their_formula() {
-    for file in ["scenes/features/reflecting-tracks.toml", "scenes/features/reflecting-tracks-lit.toml"] {
+    for file in
+        ["scenes/features/reflecting-tracks.toml", "scenes/features/reflecting-tracks-lit.toml"]
+    {
         let scene = Scene::read(file.as_ref()).unwrap();
         assert_eq!(scene.objects.len(), 401);
         let mirror = &scene.materials[&scene.objects[0].material];

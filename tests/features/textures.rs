@@ -61,7 +61,7 @@ fn b14_bump_texture() {
             ("as colours", &|s| {
                 s.materials.get_mut("plaster").unwrap().bump = None;
                 set(s, "plaster", "texture", "image");
-                set(s, "plaster", "texture.image.file", "textures/brick-heights.png");
+                set(s, "plaster", "texture.image.file", "../textures/brick-heights.png");
             }),
         ],
     );

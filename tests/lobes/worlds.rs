@@ -6,7 +6,8 @@ use crate::lobes::setup::*;
 #[test]
 fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
     let mut scene = parsed(
-        &std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/features/lobe-square.toml")).unwrap(),
+        &std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/features/lobe-square.toml"))
+            .unwrap(),
     );
     scene.film.size = [40, 30];
     let with = |scene: &mut Scene, lobe: Lobe, roughness: f64| {
