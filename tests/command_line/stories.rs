@@ -69,7 +69,7 @@ const STORIES: &[Story] = &[
     ("zerkalo check --json bad.toml", 1, "\"line\": 15", "bad.toml:15:"),
     ("zerkalo info --json q.png", 0, "\"noise_levels\": ", ""),
     ("zerkalo doctor --json", 0, "\"hints\": [", ""),
-    ("zerkalo plan scene.toml $P --json -o j.plan", 0, "\"largest_shard_rays\": ", ""),
+    ("zerkalo plan scene.toml $P --json -o j.plan", 0, "\"total_rays\": ", ""),
     ("zerkalo plan scene.toml $P -n -o j.plan", 1, "", "there is such a file already"),
     ("zerkalo render -q scene.toml --plan j.plan --shard 1 -o j-1.zk", 0, "", ""),
     ("zerkalo merge j.plan -o j.png --json", 0, "\"missing\": null", ""),

@@ -64,6 +64,13 @@ impl Tile {
         Self { stride: groups * 3, extent, ..Self::default() }
     }
 
+    /// Creates a tile that belongs to no film.
+    pub(crate) fn blank(groups: usize, extent: [usize; 2]) -> Self {
+        let mut tile = Self::cleared(groups, extent);
+        tile.clear_if_stale(1);
+        tile
+    }
+
     pub(super) fn sums_len(groups: usize) -> usize {
         2 * TILE_PIXELS * groups * 3
     }
@@ -212,7 +219,7 @@ impl Tile {
 
     /// Adds the samples of `other`, a tile at the same position of another film. At most one of the
     /// two tiles may be in its first pass.
-    pub(super) fn add_tile(&mut self, other: &Self) {
+    pub(crate) fn add_tile(&mut self, other: &Self) {
         for (replicate, pixel) in other.written() {
             self.add(replicate, pixel, other.pixel(replicate, pixel));
         }
