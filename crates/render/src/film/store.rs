@@ -295,20 +295,14 @@ impl Film {
         self.tiles[index].epoch = 0;
     }
 
-    /// Creates an empty tile for [`Film::add_at`].
-    pub(crate) fn new_tile(&self, extent: [usize; 2]) -> Tile {
-        let mut tile = Tile::cleared(self.groups(), extent);
-        tile.clear_if_stale(self.epoch);
-        tile
-    }
-
-    /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to tile `index`.
+    /// Adds the samples of `tile` to tile `index`, which has the same extent.
     pub(crate) fn add_at(&mut self, index: usize, tile: Tile) {
         let ours = &mut self.tiles[index];
         if ours.epoch == self.epoch {
             ours.add_tile(&tile);
         } else {
             *ours = tile;
+            ours.epoch = self.epoch;
         }
     }
 

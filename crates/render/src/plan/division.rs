@@ -155,7 +155,7 @@ mod tests {
     fn shards_shrink_and_large_tiles_are_cut() {
         let plan = |shards| plan(shards, &[[0, 16]; 90].map(|_| [0, 16]));
         let lengths: Vec<_> = (1..=9).map(|shard| plan(9).share(shard).ranges.len()).collect();
-        assert_eq!(lengths, [16, 14, 13, 12, 10, 8, 7, 6, 4]);
+        assert_eq!(lengths, [17, 16, 13, 12, 10, 8, 7, 4, 3]);
         let large = crate::plan::testing::plan(2, &[[8, 800], [8, 16]]);
         let [one, two] = [1, 2].map(|shard| large.share(shard));
         assert_eq!((one.first, one.ranges.len(), one.ranges[0].end), (0, 1, 576));

@@ -2,18 +2,20 @@
 //! After a change of a file, all films are added again, which takes the memory of one film only.
 
 use crate::checkpoint::seconds_of;
-use crate::film::Film;
-use crate::film::file::{FilmReader, SavedFilm};
+use crate::film::file::{FilmFileHeader, FilmReader, SavedFilm};
+use crate::film::{Film, Tile};
 use crate::plan::merge::{join, without_plan};
 use crate::plan::part::{Part, PartShard, PlanHead, ranges};
 use crate::plan::{Job, is_plan_file};
-use std::io::Read;
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 use zerkalo_scene::disk::FileStamp;
 use zerkalo_scene::value::{sort_by_number, total_order};
 
+/// Largest number of files that are decoded at once.
+const MOST_AT_ONCE: usize = 16;
 /// Age from which on an unfinished file counts as late. `zerkalo render` replaces its files every
 /// minute.
 const LATE: Duration = Duration::from_secs(180);
@@ -319,10 +321,15 @@ impl FilmFiles {
             self.files.iter_mut().filter(|file| file.first_shard().is_some()).collect();
         order.sort_by_key(|file| file.first_shard());
         let mut sum: Option<SavedFilm> = None;
-        for file in order {
-            if let Err(reason) = file.add_to(&mut sum) {
-                file.contents = Contents::Refused(reason.clone());
-                return Err(reason);
+        // The decoded files at once are a fraction of a film.
+        let at_once = (order.len() / 8).clamp(1, MOST_AT_ONCE);
+        for files in order.chunks_mut(at_once) {
+            let decoded: Vec<_> = files.par_iter().map(|file| file.decode()).collect();
+            for (file, decoded) in files.iter_mut().zip(decoded) {
+                if let Err(reason) = decoded.and_then(|decoded| file.add_to(&mut sum, decoded)) {
+                    file.contents = Contents::Refused(reason.clone());
+                    return Err(reason);
+                }
             }
         }
         self.add_round_before(&mut sum);
@@ -341,7 +348,7 @@ impl FilmFiles {
         let mut missing: Option<Vec<bool>> = None;
         for path in self.named.iter().flat_map(Job::previous_parts) {
             let Ok(reader) = FilmReader::open(&path) else { continue };
-            let Ok(SavedFilm { film, .. }) = sum_with_header_of(sum, &reader, &path) else {
+            let Ok(SavedFilm { film, .. }) = sum_with(&reader.header, sum, &path) else {
                 return;
             };
             let empty = |film: &Film| {
@@ -400,15 +407,26 @@ impl FilmFile {
         }
     }
 
-    /// Adds the film of this file to `sum`. The first film is added to an empty film with its
-    /// header. Fails if its number of samples does not fit its shards.
-    fn add_to(&mut self, sum: &mut Option<SavedFilm>) -> Result<(), String> {
-        let reader = FilmReader::open(&self.path).map_err(|error| error.to_string())?;
-        let SavedFilm { film, .. } = sum_with_header_of(sum, &reader, &self.path)?;
+    fn decode(&self) -> Result<(FilmFileHeader, Vec<(usize, Tile)>), String> {
+        let decoded = FilmReader::open(&self.path).and_then(FilmReader::tiles);
+        decoded.map_err(|error| error.to_string())
+    }
+
+    /// Adds the `tiles` of this file to `sum`, which becomes an empty film with the header of the file
+    /// if it is `None`. Fails if the number of samples does not fit the shards.
+    fn add_to(
+        &mut self,
+        sum: &mut Option<SavedFilm>,
+        (header, tiles): (FilmFileHeader, Vec<(usize, Tile)>),
+    ) -> Result<(), String> {
+        let SavedFilm { film, .. } = sum_with(&header, sum, &self.path)?;
+        let unusable = |what: &str| format!("cannot use {}: {what}", self.path.display());
+        film.check_header(&header.film).map_err(|what| unusable(&what))?;
         let before = film.samples();
-        reader.add_to(film).map_err(|error| error.to_string())?;
+        tiles.into_iter().for_each(|(number, tile)| film.add_at(number, tile));
+        let after = film.samples();
         self.count_samples();
-        self.samples = film.samples() - before;
+        self.samples = after - before;
         let (samples, expected) = (self.samples, self.total.unwrap_or(self.samples));
         if samples > expected || self.is_complete() && samples != expected {
             let path = self.path.display();
@@ -445,17 +463,18 @@ impl FilmFile {
     }
 }
 
-/// Returns `sum`, which becomes an empty film with the header of `reader` if it is `None`.
-fn sum_with_header_of<'a, R: Read>(
+/// Returns `sum`, which becomes an empty film with `header`, that of the file at `path`, if it is
+/// `None`.
+fn sum_with<'a>(
+    header: &FilmFileHeader,
     sum: &'a mut Option<SavedFilm>,
-    reader: &FilmReader<R>,
     path: &Path,
 ) -> Result<&'a mut SavedFilm, String> {
     match sum {
         Some(sum) => Ok(sum),
         None => {
-            let film = reader.header.empty_film(path).map_err(|error| error.to_string())?;
-            Ok(sum.insert(SavedFilm { header: reader.header.clone(), film }))
+            let film = header.empty_film(path).map_err(|error| error.to_string())?;
+            Ok(sum.insert(SavedFilm { header: header.clone(), film }))
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::film::file::{
 };
 use crate::film::light_weights::LightWeights;
 use crate::film::store::{Film, Header};
-use crate::film::{MAX_FILM_GROUPS, TILE};
+use crate::film::{MAX_FILM_GROUPS, TILE, Tile};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
@@ -132,11 +132,33 @@ impl<R: Read> FilmReader<R> {
         film: &mut Film,
         wanted: impl Fn(&Film, usize) -> bool,
     ) -> Result<FilmFileHeader, FileError> {
-        let picture = self.header.film.clone();
-        film.check_header(&Header { height: film.header.height, ..picture.clone() })
+        film.check_header(&Header { height: film.header.height, ..self.header.film.clone() })
             .map_err(|what| self.input.error(what, "name a file of the same render"))?;
         let first = film.first_row / TILE * film.tile_columns();
-        let band = first..first + film.tile_count();
+        self.each_tile(first..first + film.tile_count(), |number, tile| {
+            if wanted(film, number - first) {
+                film.add_at(number - first, tile);
+            }
+        })
+    }
+
+    /// Reads header and tiles. Most of the time of reading a film is that of decoding them, which
+    /// several threads can do for several files.
+    pub(crate) fn tiles(self) -> Result<(FilmFileHeader, Vec<(usize, Tile)>), FileError> {
+        let mut tiles = Vec::new();
+        let all = 0..self.header.film.tiles();
+        let header = self.each_tile(all, |number, tile| tiles.push((number, tile)))?;
+        Ok((header, tiles))
+    }
+
+    /// Calls `each` with the tiles of `band` that have samples, and their numbers in the picture.
+    fn each_tile(
+        self,
+        band: Range<usize>,
+        mut each: impl FnMut(usize, Tile),
+    ) -> Result<FilmFileHeader, FileError> {
+        let picture = self.header.film.clone();
+        let groups = picture.scales.len();
         self.visit_tiles(|fields, numbers| {
             if numbers.start >= band.end || numbers.end <= band.start {
                 return Some(());
@@ -146,10 +168,10 @@ impl<R: Read> FilmReader<R> {
                     fields.0 = rest;
                     continue;
                 }
-                let mut tile = film.new_tile(picture.extent(number));
-                tile_record::decode(&mut tile, picture.scales.len(), fields)?;
-                if band.contains(&number) && wanted(film, number - first) {
-                    film.add_at(number - first, tile);
+                let mut tile = Tile::blank(groups, picture.extent(number));
+                tile_record::decode(&mut tile, groups, fields)?;
+                if band.contains(&number) {
+                    each(number, tile);
                 }
             }
             fields.is_empty().then_some(())
