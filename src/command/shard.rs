@@ -173,7 +173,7 @@ impl ShardTracer<'_> {
             Ok::<_, WriteError>(())
         };
         if saved.is_none() && !path.exists() {
-            // The empty part tells other processes that the shard is taken.
+            // The empty part shows other processes that the shard is taken.
             match write(&render, false) {
                 Err(error) if is_taken(&error) => {
                     self.state = Some(render.state);
