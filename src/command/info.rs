@@ -63,9 +63,10 @@ fn of_plan(plan: &Plan) -> FileMetadata {
     let settings = &plan.settings;
     let base = settings.base_plan.map_or("none".to_string(), |plan| format!("plan {plan:016x}"));
     let (base_rays, total) = (settings.base_rays as f64, settings.total_rays);
-    let new: f64 = (1..=settings.shards).map(|shard| plan.rays(shard)).sum();
-    let rays =
-        format!("{new:.3e} in this round, {base_rays:.3e} before, {total:.3e} in all rounds");
+    let rays = format!(
+        "{:.3e} in this round, {base_rays:.3e} before, {total:.3e} in all rounds",
+        plan.rays()
+    );
     let sampler = settings.sampler.name();
     let method = settings_text(sampler, settings.precision, true, &settings.display);
     let entries = [

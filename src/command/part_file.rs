@@ -33,13 +33,6 @@ impl FilmOutput {
         Ok(Self::Picture(output, depth))
     }
 
-    pub fn path(&self) -> &Path {
-        match self {
-            Self::Film(path, _) => path,
-            Self::Picture(output, _) => &output.path,
-        }
-    }
-
     /// Writes `film`. A picture uses the light weights, the display transform and the metadata of
     /// `header`. Returns the file with its lock.
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<File, WriteError> {

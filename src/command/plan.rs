@@ -25,15 +25,15 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     if !args.json.json {
         return print_line(&describe(&path, &plan));
     }
-    let (settings, new) = (&plan.settings, |shard| plan.rays(shard));
+    let settings = &plan.settings;
     print_json(&json!({
         "plan": path.display().to_string(),
         "round": settings.round,
         "shards": settings.shards,
-        "spp": plan.spp(),
+        "spp": plan.head().spp(),
         // Null in the first round, before there is an estimate.
         "noise_levels": Some(plan.predicted_levels).filter(|levels| *levels > 0.0),
-        "rays": (1..=settings.shards).map(new).sum::<f64>(),
+        "rays": plan.rays(),
         "base_rays": settings.base_rays,
         "total_rays": Some(settings.total_rays).filter(|rays| *rays > 0.0),
     }))

@@ -16,7 +16,7 @@ use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_render::export::scene_hash;
 use zerkalo_render::film::file::FilmReader;
 use zerkalo_render::plan::{Job, Part, PartShard, PlanHead, ShardRender};
-use zerkalo_render::{Options, RenderState};
+use zerkalo_render::{FileError, Options, RenderState};
 use zerkalo_scene::disk::{Claim, Existing, WriteError};
 use zerkalo_scene::{Acceleration, Document};
 use zerkalo_terminal::Signals;
@@ -40,11 +40,11 @@ pub fn run(args: &RenderArgs, plan: &Path) -> Result<(), Failure> {
     let mut claim = save::claim(&args.output)?;
     let signals = handle_signals()?;
     let state = compile(&document, &args.scene, &job, args.acceleration)?;
-    let threads = args.compute.threads();
     let Some(number) = args.shard else {
-        return whole(&job, &output, state, threads, &signals);
+        return whole(args, &job, &output, state, &signals);
     };
-    let mut tracer = ShardTracer { state: Some(state), threads, signals: &signals };
+    let mut tracer =
+        ShardTracer { state: Some(state), threads: args.compute.threads(), signals: &signals };
     match tracer.trace(&job, number, &mut claim)? {
         Traced::Done => Ok(()),
         Traced::Taken => Err(Failure::Failed(format!(
@@ -57,12 +57,13 @@ pub fn run(args: &RenderArgs, plan: &Path) -> Result<(), Failure> {
 
 /// Traces all samples of the plan of `job` in this process.
 fn whole(
+    args: &RenderArgs,
     job: &Job,
     output: &FilmOutput,
     state: RenderState,
-    threads: usize,
     signals: &Signals,
 ) -> Result<(), Failure> {
+    let threads = args.compute.threads();
     let mut render = ShardRender::new(state, &job.plan, job.plan.whole(), threads)?;
     let signal = trace(&mut render, signals, &mut |_| Ok(()));
     let unfinished = signal.is_some() && render.progress() < 1.0;
@@ -76,7 +77,7 @@ fn whole(
     let written = save::persist(|| part_file::write(output, &render, &part))?;
     let rays = job.head.settings.base_rays + render.rays();
     let share = stopped(&render, unfinished);
-    let path = output.path().display();
+    let path = args.output.display();
     print_line(&format!("{path}  {}  {rays} rays{share}", part_file::summary(&written.report)))?;
     signal.filter(|_| unfinished).map_or(Ok(()), |status| Err(Failure::Signalled(status)))
 }
@@ -209,12 +210,9 @@ impl ShardTracer<'_> {
 
 /// Formats the progress of a shard that a signal has stopped.
 fn stopped(render: &ShardRender, unfinished: bool) -> String {
-    match unfinished {
-        true => {
-            format!("  {:.0} % of the samples (stopped by a signal)", 100.0 * render.progress())
-        }
-        false => String::new(),
-    }
+    let share = 100.0 * render.progress();
+    let text = format!("  {share:.0} % of the samples (stopped by a signal)");
+    if unfinished { text } else { String::new() }
 }
 
 /// File of an earlier run of a shard.
@@ -237,10 +235,13 @@ fn saved(path: &Path, plan: &PlanHead, number: u32) -> Result<Saved, Failure> {
             path.display()
         ))
     };
-    let Ok(reader) = FilmReader::open(path)
-        .inspect_err(|error| warn(&format!("warning: {error}; the shard starts again")))
-    else {
-        return Ok(Saved::Nothing);
+    let damaged = |error: FileError| {
+        warn(&format!("warning: {error}; the shard starts again"));
+        Ok(Saved::Nothing)
+    };
+    let reader = match FilmReader::open(path) {
+        Ok(reader) => reader,
+        Err(error) => return damaged(error),
     };
     let found = Part::of_header(path, &reader.header)?;
     let found = found.ok_or_else(|| failed("is a film without plan"))?;
@@ -251,11 +252,13 @@ fn saved(path: &Path, plan: &PlanHead, number: u32) -> Result<Saved, Failure> {
     if shard.number != number {
         return Err(failed(&format!("holds shard {}", shard.number)));
     }
-    Ok(match shard.samples {
-        _ if shard.complete => Saved::Complete(found.rays),
-        [0, _] => Saved::Nothing,
-        _ => Saved::Unfinished(Box::new(reader)),
-    })
+    match shard.samples {
+        _ if shard.complete => {
+            reader.verify().map(|_| Saved::Complete(found.rays)).or_else(damaged)
+        }
+        [0, _] => Ok(Saved::Nothing),
+        _ => Ok(Saved::Unfinished(Box::new(reader))),
+    }
 }
 
 /// Returns `true` if the part at `path` is complete and belongs to `plan`.

@@ -5,11 +5,11 @@ use crate::command::{Failure, print_json, print_line};
 use crate::dashboard::text::duration;
 use serde_json::json;
 use std::time::SystemTime;
-use zerkalo_render::plan::{FilmFiles, WatchedShards, WatchedState};
+use zerkalo_render::plan::{FilmFiles, WatchedState};
 
 pub fn run(args: &StatusArgs) -> Result<(), Failure> {
     let now = SystemTime::now();
-    let files = FilmFiles::of_headers(std::slice::from_ref(&args.plan))?;
+    let (files, _) = FilmFiles::of_headers(std::slice::from_ref(&args.plan))?;
     let job = files.job().ok_or("name a plan file, which `zerkalo plan` has written")?;
     let settings = &job.head.settings;
     let rows = files.shards(now);
@@ -17,14 +17,12 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
         let found = rows.iter().filter(move |row| row.state == state);
         found.map(|row| row.shards.clone()).collect::<Vec<_>>()
     };
-    let failure = |row: &WatchedShards| match &row.state {
-        WatchedState::Refused(reason) => Some(json!({ "shard": row.shards, "reason": reason })),
-        WatchedState::Complete
-        | WatchedState::Running
-        | WatchedState::Late
-        | WatchedState::Missing => None,
-    };
-    let failed: Vec<_> = rows.iter().filter_map(failure).collect();
+    let mut failed = Vec::new();
+    for row in &rows {
+        if let WatchedState::Refused(reason) = &row.state {
+            failed.push(json!({ "shard": row.shards, "reason": reason }));
+        }
+    }
     let [complete, late] = [WatchedState::Complete, WatchedState::Late].map(is);
     let finished = job.is_finished();
     let (rays, base) = (files.rays(), settings.base_rays);
@@ -35,7 +33,7 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
             let seconds = now.duration_since(planned).unwrap_or_default().as_secs_f64();
             let rate = (rays - base) as f64 / seconds.max(1.0);
             let left = (total - rays as f64).max(0.0);
-            ((Some((rays as f64 / total).min(1.0))), (rate > 0.0).then(|| left / rate / 3600.0))
+            (Some((rays as f64 / total).min(1.0)), (rate > 0.0).then(|| left / rate / 3600.0))
         }
         _ => (None, None),
     };

@@ -41,14 +41,6 @@ struct Worker<'a> {
     complete: Vec<bool>,
 }
 
-/// What has become of a shard that a worker tried to take.
-#[derive(PartialEq, Eq)]
-enum Taken {
-    Traced,
-    /// Another process is tracing it.
-    Busy,
-}
-
 impl Worker<'_> {
     fn run(mut self) -> Result<(), Failure> {
         while !self.job.is_finished() {
@@ -68,19 +60,19 @@ impl Worker<'_> {
         print_line(&format!("{}  finished", self.job.path.display()))
     }
 
-    /// Traces a shard, unless another process does.
-    fn take(&mut self, number: u32) -> Result<Taken, Failure> {
+    /// Traces a shard. Returns `false` if another process does.
+    fn take(&mut self, number: u32) -> Result<bool, Failure> {
         let path = self.job.part_path(number);
         let mut claim = match Claim::new(&path) {
-            Err(error) if shard::is_taken(&error) => return Ok(Taken::Busy),
+            Err(error) if shard::is_taken(&error) => return Ok(false),
             claim => claim?,
         };
         if claim.is_unlocked() && age(&path) < DEAD {
-            return Ok(Taken::Busy);
+            return Ok(false);
         }
         match self.tracer.trace(&self.job, number, &mut claim)? {
-            Traced::Done => Ok(Taken::Traced),
-            Traced::Taken => Ok(Taken::Busy),
+            Traced::Done => Ok(true),
+            Traced::Taken => Ok(false),
             Traced::Stopped(status) => Err(Failure::Signalled(status)),
         }
     }
@@ -103,7 +95,7 @@ impl Worker<'_> {
             if !self.complete[index] {
                 let path = self.job.part_path(shard);
                 self.complete[index] =
-                    shard::is_complete(&path, &self.job.head) || self.take(shard)? == Taken::Traced;
+                    shard::is_complete(&path, &self.job.head) || self.take(shard)?;
             }
             all_complete &= self.complete[index];
         }
@@ -130,7 +122,7 @@ fn age(path: &Path) -> Duration {
 /// Formats what a plan decides, and why other rounds follow.
 pub fn describe(path: &Path, plan: &Plan) -> String {
     let settings = &plan.settings;
-    let (path, round, spp) = (path.display(), settings.round, plan.spp());
+    let (path, round, spp) = (path.display(), settings.round, plan.head().spp());
     let target = settings.noise_levels;
     if round == 1 {
         return format!(

@@ -238,7 +238,8 @@ fn finished_job_is_refined_by_further_rounds() {
     workers.into_iter().for_each(|mut worker| assert!(worker.wait().unwrap().success()));
     let text = done(&desk, &["merge", "job.plan", "-o", "a.png"]);
     let noise = text.split("noise ").nth(1).unwrap().split(' ').next().unwrap();
-    assert!((0.23..=0.2575).contains(&noise.parse::<f64>().unwrap()), "{text}");
+    // In a picture of twelve tiles, a block of samples is a large step.
+    assert!((0.2..=0.2575).contains(&noise.parse::<f64>().unwrap()), "{text}");
     let last = (round..).map(|round| format!("job.{round}.plan"));
     let last = last.take_while(|plan| desk.path(plan).exists()).last().unwrap();
     done(&desk, &["render", "scene.toml", "--plan", &last, "-o", "one.png"]);

@@ -82,7 +82,7 @@ const STORIES: &[Story] = &[
     ("zerkalo compare a.png scene.toml", 1, "", "it is no PNG, OpenEXR or film file"),
     ("zerkalo compare a.png j-1.zk", 1, "", "it is a film; expected a PNG or OpenEXR picture"),
     // Mistyped names, errors in scenes.
-    ("zerkalo rendr scene.toml", 2, "", "did you mean `render`?\nCommands: render, plan, merge"),
+    ("zerkalo rendr scene.toml", 2, "", "did you mean `render`?\nCommands: render, plan, work"),
     ("zerkalo rendr", 2, "", "did you mean `render`?"),
     ("zerkalo check scen.toml", 1, "", "Did you mean scene.toml?"),
     (

@@ -184,7 +184,7 @@ fn parse_head(lines: &mut Lines) -> Result<(PlanSettings, f64, [f64; 2]), FileEr
     // The fields are read in the order of the file. The last ones are set below, after other
     // lines.
     let mut settings = PlanSettings {
-        source: lines.setting("scene", "a file name", |text| Some(text.to_string()))?,
+        source: lines.setting("scene", "a file name", |text| Some(sanitized(text).to_string()))?,
         scene_hash: lines.setting("scene_hash", "a hash", |text| Some(text.to_string()))?,
         size: lines.setting("size", "WIDTHxHEIGHT, 1 to 16384 pixels each", |text| {
             let (width, height) = text.split_once('x')?;

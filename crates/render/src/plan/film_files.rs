@@ -90,17 +90,26 @@ pub struct WatchedShards {
 
 impl FilmFiles {
     /// Reads the film files at `paths`, which may be missing. A plan file stands for the film files
-    /// of the latest round of its job: `job.plan` for `job-1.zk`, `job-2.zk` and so on. Fails if a plan file cannot
-    /// be used, or if the films of two files cannot be added.
+    /// of the latest round of its job: `job.plan` for `job-1.zk`, `job-2.zk` and so on. Fails if a
+    /// plan file cannot be used, or if the films of two files cannot be added.
     pub fn open(paths: &[PathBuf]) -> Result<Self, String> {
+        match Self::of_headers(paths)? {
+            (_, Some(reason)) => Err(reason),
+            (mut films, None) => {
+                films.add();
+                Ok(films)
+            }
+        }
+    }
+
+    /// Reads the headers of the film files at `paths`, as [`Self::open`] does. Also returns the
+    /// reason for which it refuses the first file whose film cannot be added, if any.
+    pub fn of_headers(paths: &[PathBuf]) -> Result<(Self, Option<String>), String> {
         let mut films = Self::default();
         films.name(paths)?;
         let changed = films.read_changed();
-        if let Some(reason) = films.accept(&changed) {
-            return Err(reason);
-        }
-        films.add();
-        Ok(films)
+        let reason = films.accept(&changed);
+        Ok((films, reason))
     }
 
     /// Reads the headers of the parts at `paths`. A plan file stands for the film files of its
@@ -117,15 +126,6 @@ impl FilmFiles {
             }
         }
         films.try_join().map(|()| films)
-    }
-
-    /// Reads the headers of the film files at `paths`, which may be missing, as [`Self::open`] does.
-    pub fn of_headers(paths: &[PathBuf]) -> Result<Self, String> {
-        let mut films = Self::default();
-        films.name(paths)?;
-        let changed = films.read_changed();
-        films.accept(&changed);
-        Ok(films)
     }
 
     /// Returns the job whose plan was named.
@@ -165,28 +165,26 @@ impl FilmFiles {
         self.files.extend(shards.map(|shard| FilmFile::new(job.part_path(shard), Some(shard))));
     }
 
-    /// Reads the files that were replaced since the last call. Returns `true` if any were replaced.
+    /// Reads the files that were replaced since the last call, and goes on to the latest round.
+    /// Returns `true` if any were replaced.
     pub fn poll(&mut self) -> bool {
-        if self.named.as_mut().is_some_and(Job::advance) {
+        let advanced = self.named.as_mut().is_some_and(Job::advance);
+        if advanced {
             self.name_parts();
         }
         let changed = self.read_changed();
-        if !changed.is_empty() {
+        let differs = advanced || !changed.is_empty();
+        if differs {
             self.accept(&changed);
             self.add();
         }
-        !changed.is_empty()
+        differs
     }
 
     /// Returns the rays of all rounds so far.
     pub fn rays(&self) -> u64 {
         let earlier = self.plan.as_ref().map_or(0, |plan| plan.settings.base_rays);
-        earlier + self.rays_of_round()
-    }
-
-    /// Returns the rays of the parts.
-    fn rays_of_round(&self) -> u64 {
-        self.parts().map(|(_, part)| part.rays).sum()
+        earlier + self.parts().map(|(_, part)| part.rays).sum::<u64>()
     }
 
     /// Returns the seconds of rendering that a checkpoint states, or the time from the earliest to
@@ -356,7 +354,7 @@ impl FilmFiles {
             };
             let missing = missing.get_or_insert_with(|| empty(film));
             // The picture lacks the tiles of a part that cannot be read.
-            let _ = reader.add_tiles(film, |_, tile| missing[tile]);
+            let _ = reader.add_tiles(film, |tile| missing[tile]);
         }
     }
 
@@ -365,7 +363,8 @@ impl FilmFiles {
         let mut shards: Vec<PartShard> = self.shards_held().copied().collect();
         shards.sort_unstable();
         let plan = self.plan.as_ref().filter(|_| !shards.is_empty())?;
-        Some(Part { plan: Arc::clone(plan), shards, rays: self.rays_of_round() })
+        let rays = self.rays() - plan.settings.base_rays;
+        Some(Part { plan: Arc::clone(plan), shards, rays })
     }
 }
 

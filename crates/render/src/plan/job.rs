@@ -4,14 +4,12 @@ use crate::FileError;
 use crate::film::Estimator;
 use crate::film::file::FilmReader;
 use crate::plan::share_report::RoundReport;
-use crate::plan::{Part, Plan, Share};
+use crate::plan::{Part, Plan, PlanHead, Share};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zerkalo_scene::disk;
-
-use crate::plan::PlanHead;
 
 /// Plan of the latest round of a render. The file of its first round is `job.plan`, those of the
 /// later ones are `job.2.plan`, `job.3.plan` and so on, beside it; the parts of `job.2.plan` are
@@ -114,24 +112,21 @@ impl Job {
         self.plan.next(&round.finish(&estimator), noise_levels)
     }
 
-    /// File that exists when the job meets its target.
-    fn finished_path(&self) -> PathBuf {
-        self.path.with_extension("finished")
-    }
-
     /// Returns `true` if [`Self::set_finished`] was called for the latest round.
     pub fn is_finished(&self) -> bool {
-        let text = std::fs::read_to_string(self.finished_path()).unwrap_or_default();
-        text == self.finished_text()
+        let (path, text) = self.finished();
+        std::fs::read_to_string(path).is_ok_and(|found| found == text)
     }
 
     /// Records that no round follows this one.
     pub fn set_finished(&self) -> Result<(), disk::WriteError> {
-        disk::write(&self.finished_path(), self.finished_text().as_bytes())
+        let (path, text) = self.finished();
+        disk::write(&path, text.as_bytes())
     }
 
-    fn finished_text(&self) -> String {
-        format!("plan {:016x}\n", self.head.checksum)
+    /// Returns path and contents of the file that records the end of the job.
+    fn finished(&self) -> (PathBuf, String) {
+        (self.path.with_extension("finished"), format!("plan {:016x}\n", self.head.checksum))
     }
 }
 

@@ -140,27 +140,19 @@ impl Plan {
         Ok(Some(Self { settings, predicted_levels: round.rmse, slopes, tiles }))
     }
 
-    /// Returns the expected number of rays of a shard, without its base.
-    pub fn rays(&self, shard: u32) -> f64 {
-        let Share { first, ranges } = self.share(shard);
-        let new = |(tile, range): (usize, &std::ops::Range<u32>)| {
-            let planned = &self.tiles[tile];
-            let count = range.end.saturating_sub(range.start.max(planned.base));
-            2.0 * f64::from(count) * self.pixels(tile) as f64 * f64::from(planned.rays_per_sample)
+    /// Returns the expected number of rays of the round.
+    pub fn rays(&self) -> f64 {
+        let rays = |(i, tile): (usize, &PlannedTile)| {
+            let samples = 2 * u64::from(tile.end - tile.base) * self.pixels(i);
+            samples as f64 * f64::from(tile.rays_per_sample)
         };
-        (first..).zip(&ranges).map(new).sum()
+        self.tiles.iter().enumerate().map(rays).sum()
     }
 
     /// Returns the number of samples of a share, base included, over all pixels and both replicates.
     pub fn samples(&self, share: &Share) -> u64 {
         let ranges = (share.first..).zip(&share.ranges);
         ranges.map(|(tile, range)| 2 * range.len() as u64 * self.pixels(tile)).sum()
-    }
-
-    /// Returns the mean samples per pixel in the merged picture, over both replicates.
-    pub fn spp(&self) -> f64 {
-        let [width, height] = self.settings.size.map(u64::from);
-        self.samples(&self.whole()) as f64 / (width * height) as f64
     }
 
     /// Returns the first tile in which `film` does not have the planned sample counts.

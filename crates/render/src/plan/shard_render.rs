@@ -91,7 +91,7 @@ impl ShardRender {
             report.first == self.report.first && report.tiles.len() == self.report.tiles.len()
         };
         self.report = report.filter(fits).ok_or("it has no report of its tiles")?;
-        part.add_tiles(&mut self.state.film, |_, _| true).map_err(|error| error.to_string())?;
+        part.add_tiles(&mut self.state.film, |_| true).map_err(|error| error.to_string())?;
         self.find_remaining()
     }
 
@@ -99,12 +99,13 @@ impl ShardRender {
     /// first sample.
     pub fn take_base<R: Read>(&mut self, parts: impl Iterator<Item = FilmReader<R>>) {
         let mut bases = vec![0; self.state.film.tile_count()];
-        for (i, _) in self.share.ranges.iter().enumerate().filter(|(_, range)| range.start == 0) {
-            bases[self.share.first + i - self.offset] = self.planned[i].base;
+        for (i, planned) in self.planned.iter().enumerate() {
+            let held = if self.share.ranges[i].start == 0 { planned.base } else { 0 };
+            bases[self.share.first + i - self.offset] = held;
         }
         for part in parts {
             // Tiles of a damaged part have other counts than the base, and are discarded below.
-            let _ = part.add_tiles(&mut self.state.film, |_, tile| bases[tile] > 0);
+            let _ = part.add_tiles(&mut self.state.film, |tile| bases[tile] > 0);
         }
         for (tile, base) in bases.iter().enumerate() {
             if self.state.film.counts(tile) != [*base; 2] {

@@ -120,9 +120,7 @@ impl<R: Read> FilmReader<R> {
 
     /// Adds the samples of the file to `film`. After an error, `film` may contain some of them.
     pub fn add_to(self, film: &mut Film) -> Result<FilmFileHeader, FileError> {
-        film.check_header(&self.header.film)
-            .map_err(|what| self.input.error(what, "name a file of the same render"))?;
-        self.add_tiles(film, |_, _| true)
+        self.add_tiles(film, |_| true)
     }
 
     /// Adds the tiles for which `wanted` returns `true`, given their numbers in `film`, which may be
@@ -130,13 +128,13 @@ impl<R: Read> FilmReader<R> {
     pub(crate) fn add_tiles(
         self,
         film: &mut Film,
-        wanted: impl Fn(&Film, usize) -> bool,
+        wanted: impl Fn(usize) -> bool,
     ) -> Result<FilmFileHeader, FileError> {
         film.check_header(&Header { height: film.header.height, ..self.header.film.clone() })
             .map_err(|what| self.input.error(what, "name a file of the same render"))?;
         let first = film.first_row / TILE * film.tile_columns();
         self.each_tile(first..first + film.tile_count(), |number, tile| {
-            if wanted(film, number - first) {
+            if wanted(number - first) {
                 film.add_at(number - first, tile);
             }
         })
