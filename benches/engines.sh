@@ -23,6 +23,7 @@ export PLAN_OPTIONS="--size ${SIZE:-400x300}" SHARDS="${SHARDS:-32}"
 work="$(mktemp -d)"
 daemons=()
 cleanup() {
+    pgrep -f "^$ZERKALO work .*$work" | xargs -r kill 2>/dev/null || true
     for pid in "${daemons[@]}"; do kill "$pid" 2>/dev/null || true; done
     wait
     rm -rf "$work"
@@ -80,7 +81,7 @@ gnu_parallel() {
     wait "$engine" 2>/dev/null || true
     say "the same command again"
     "${run[@]}" > "$work/parallel.log" 2>&1 || { cat "$work/parallel.log"; exit 1; }
-    grep -h 'round\|finished\|spp' "$work/parallel.log" | sort -u | sed "s|$work/||g; s/^/        /"
+    grep -h '8-bit levels\|finished' "$work/parallel.log" | sort -u | sed "s|$work/||g; s/^/        /"
     "$ZERKALO" status "$work/job.plan" | sed "s|$work/||; s/^/        /"
     equal job
 }
@@ -146,12 +147,13 @@ slurm() {
     say "kill -9 of a worker"
     kill -9 "$(workers slurm | head -n 1)"
 
-    task="$(squeue -h -t R -w node2 -o %K)"
+    task=""
+    until [ -n "$task" ]; do sleep 1; task="$(squeue -h -t R -w node2 -o %K)"; done
     say "node2 is drained, and its task (worker $task) put back into the queue"
     scontrol update NodeName=node2 State=DRAIN Reason=maintenance
     scontrol requeue "${array}_$task"
 
-    task="$(squeue -h -t R -w node3 -o %K)"
+    task=""
     until [ -n "$task" ]; do sleep 1; task="$(squeue -h -t R -w node3 -o %K)"; done
     # All processes of the node at once: daemon, job step, script, worker.
     say "node3 is lost (slurmd, task and worker $task are killed)"
@@ -171,7 +173,7 @@ slurm() {
     wait_for_jobs
     say "logs of the tasks"
     grep -h 'exit status' "$work"/slurm-worker-*.log | sort | sed 's/^/        /'
-    grep -h 'round\|finished\|spp' "$work"/slurm-worker-*.log "$work/slurm-merge.log" | sort -u | sed "s|$work/||g; s/^/        /"
+    grep -h '8-bit levels\|finished' "$work"/slurm-worker-*.log "$work/slurm-merge.log" | sort -u | sed "s|$work/||g; s/^/        /"
     equal slurm
 }
 

@@ -68,7 +68,7 @@ const SETUP: Setup = Setup {
     take_seconds: 0.02,
     film_mb: 600.0,
     part_mb_s: 300.0,
-    merge_mb_s: 200.0,
+    merge_mb_s: 500.0,
     picture_seconds: 3.0,
     planning_seconds: 0.6,
     misjudged: 0.1,
