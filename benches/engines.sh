@@ -23,6 +23,8 @@ export PLAN_OPTIONS="--size ${SIZE:-400x300}" SHARDS="${SHARDS:-32}"
 work="$(mktemp -d)"
 daemons=()
 cleanup() {
+    # Daemons wait for their tasks.
+    [ -z "${SLURM_CONF:-}" ] || { scancel --user=root && sleep 10; } 2>/dev/null || true
     pgrep -f "^$ZERKALO work .*$work" | xargs -r kill 2>/dev/null || true
     for pid in "${daemons[@]}"; do kill "$pid" 2>/dev/null || true; done
     wait
