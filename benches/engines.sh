@@ -1,27 +1,31 @@
 #!/usr/bin/env bash
-# End-to-end test of the scripts in examples/many-machines: one plan traced by GNU parallel and by Slurm, with a
-# command killed (kill -9), a node drained, a node lost and a time limit reached on purpose. The pictures must equal one run of the plan byte
-# by byte.
+# End-to-end test of the scripts in examples/many-machines: a scene rendered by GNU parallel and by Slurm, with a worker
+# killed (kill -9), all workers and the engine killed between two rounds, a node drained, a node lost and a time limit
+# reached on purpose. The pictures must equal one run of the last plan byte by byte.
 #
 #   apt-get install parallel slurm-wlm munge
 #   benches/engines.sh [parallel] [slurm] > benches/runs/DATE-engines.txt
 #
-# It must run as root, in a container or on a spare machine: it starts munged, slurmctld and three slurmd of its own,
-# and ends them. ZERKALO names a program that has been built already. It takes eleven minutes on two cores,
-# of which Slurm waits four before it starts tasks again.
+# It must run as root, in a container or on a spare machine: it starts munged, slurmctld and four slurmd of its own,
+# and ends them. ZERKALO names a program that has been built already. Slurm waits four minutes before it starts tasks again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 [ $# -gt 0 ] || set -- parallel slurm
 
 if [ -z "${ZERKALO:-}" ]; then
-    cargo build >&2
-    ZERKALO="$(cargo metadata --format-version 1 --no-deps | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')/debug/zerkalo"
+    cargo build --release >&2
+    ZERKALO="$(cargo metadata --format-version 1 --no-deps | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')/release/zerkalo"
 fi
 export ZERKALO
-size="${SIZE:-560x420}"
+scene=scenes/features/glass-solids.toml
+noise="${NOISE:-0.25}"
+export PLAN_OPTIONS="--size ${SIZE:-400x300}" SHARDS="${SHARDS:-32}"
 work="$(mktemp -d)"
 daemons=()
 cleanup() {
+    # Daemons wait for their tasks.
+    [ -z "${SLURM_CONF:-}" ] || { scancel --user=root && sleep 10; } 2>/dev/null || true
+    pgrep -f "^$ZERKALO work .*$work" | xargs -r kill 2>/dev/null || true
     for pid in "${daemons[@]}"; do kill "$pid" 2>/dev/null || true; done
     wait
     rm -rf "$work"
@@ -30,29 +34,26 @@ trap cleanup EXIT
 start="$SECONDS"
 say() { printf '%4d s  %s\n' "$((SECONDS - start))" "$*"; }
 
-# Process of the shard $1 of the plan $2, as soon as it has written a checkpoint.
-shard_process() {
-    until [ -e "$work/$2-$1.zk" ]; do sleep 0.2; done
-    pgrep -f "^$ZERKALO render .*$2.plan --shard $1 " || {
-        echo "shard $1 has ended already; use a larger SIZE than $size" >&2
-        return 1
-    }
+# Waits until workers trace parts of the plan $1.
+wait_for_part() {
+    until compgen -G "$work/$1-*.zk" > /dev/null; do sleep 0.2; done
+    sleep 1
 }
 
-# plan NAME [SHARDS] [NOISE]
-plan() {
-    "$ZERKALO" plan scenes/features/glass-solids.toml --size "$size" --noise "${3:-${NOISE:-0.25}}" --pilot 2 --shards "${2:-8}" \
-        -o "$work/$1.plan" --base "$work/$1-0.zk"
+# Processes of the workers of the job $1.
+workers() {
+    pgrep -f "^$ZERKALO work .*$work/$1.plan" || { echo "no worker of $1 runs; use a larger SIZE" >&2; return 1; }
 }
 
+# Compares the picture of the job $1 with one run of its last plan.
 equal() {
-    cmp "$work/one.png" "$work/$1.png" && say "$1.png equals the picture of one run"
+    local plan="$work/$1.plan" round=2
+    while [ -e "$work/$1.$round.plan" ]; do plan="$work/$1.$round.plan" round=$((round + 1)); done
+    "$ZERKALO" render "$scene" --plan "$plan" -o "$work/one.png" 2>/dev/null | sed "s|$work/||g; s/^/        /"
+    cmp "$work/one.png" "$work/$1.png" && say "$1.png equals the picture of one run of $(basename "$plan")"
 }
 
 echo "$(uname -sr), $(nproc) cores, zerkalo $("$ZERKALO" --version | cut -d' ' -f2)"
-plan one
-"$ZERKALO" render scenes/features/glass-solids.toml --plan "$work/one.plan" -o "$work/one.png" 2>/dev/null
-say "one run of the plan is done"
 
 wait_for_jobs() {
     while squeue -h -o '%i %T %r' | grep -q .; do
@@ -67,19 +68,23 @@ wait_for_jobs() {
 }
 
 gnu_parallel() {
-    plan job > /dev/null
-    printf '1/:\n1/:\n1/:\n' > "$work/hosts"
-    say "GNU parallel $(parallel --version | head -n 1 | cut -d' ' -f3): 8 shards, three at a time"
-    RENDER_OPTIONS="--threads 1" examples/many-machines/parallel.sh scenes/features/glass-solids.toml "$work/job.plan" "$work/hosts" "$work/job.png" \
-        > "$work/parallel.log" 2>&1 &
-    local engine=$! victim
-    victim="$(shard_process 2 job)"
-    say "kill -9 of shard 2 after its first checkpoint"
-    kill -9 "$victim"
-    wait "$engine" || { cat "$work/parallel.log"; exit 1; }
-    grep -v '^\([0-9.]* % .* left\|$\)' "$work/parallel.log" | sed "s|$work/||g; s/^/        /"
-    say "exit statuses (GNU parallel's job log, the last attempt of each shard):"
-    awk 'NR > 1 { printf "        shard %s: exit %s, signal %s, %s s\n", $1, $7, $8, $4 }' "$work/job.joblog"
+    printf '1/:\n1/:\n1/:\n1/:\n' > "$work/hosts"
+    say "GNU parallel $(parallel --version | head -n 1 | cut -d' ' -f3): $SHARDS shards, four workers"
+    local run=(env "WORK_OPTIONS=--threads 1" examples/many-machines/parallel.sh "$scene" "$noise" "$work/hosts" "$work/job.png")
+    setsid "${run[@]}" > "$work/parallel.log" 2>&1 &
+    local engine=$!
+    wait_for_part job
+    say "kill -9 of a worker"
+    kill -9 "$(workers job | head -n 1)"
+    until [ -e "$work/job.2.plan" ]; do sleep 0.1; done
+    say "kill -9 of GNU parallel and of all workers, one of which has planned round 2"
+    kill -9 -- "-$engine" 2>/dev/null || true
+    { workers job | xargs kill -9; } 2>/dev/null || true
+    wait "$engine" 2>/dev/null || true
+    say "the same command again"
+    "${run[@]}" > "$work/parallel.log" 2>&1 || { cat "$work/parallel.log"; exit 1; }
+    grep -h '8-bit levels\|finished' "$work/parallel.log" | sort -u | sed "s|$work/||g; s/^/        /"
+    "$ZERKALO" status "$work/job.plan" | sed "s|$work/||; s/^/        /"
     equal job
 }
 
@@ -115,7 +120,7 @@ slurm() {
         echo "KillWait=5"
         echo "ReturnToService=2"
         echo "SlurmdTimeout=15"
-        for node in 1 2 3; do
+        for node in 1 2 3 4; do
             echo "NodeName=node$node NodeHostname=$host NodeAddr=127.0.0.1 Port=1700$node CPUs=1 State=UNKNOWN"
         done
         echo "PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP"
@@ -124,44 +129,43 @@ slurm() {
     slurmctld -D > "$work/slurmctld.log" 2>&1 &
     daemons+=($!)
     local slurmd=()
-    for node in 1 2 3; do
+    for node in 1 2 3 4; do
         mkdir -p "$work/spool.node$node"
         slurmd -D -N "node$node" > "$work/slurmd.$node.log" 2>&1 &
         daemons+=($!)
         slurmd+=($!)
     done
     for _ in $(seq 60); do
-        [ "$(sinfo -h -t idle -o %D 2>/dev/null || true)" = 3 ] && break
+        [ "$(sinfo -h -t idle -o %D 2>/dev/null || true)" = 4 ] && break
         sleep 1
     done
     say "Slurm $(slurmctld -V | cut -d' ' -f2): $(sinfo -h -o '%D nodes %t')"
-    plan slurm > /dev/null
-    local jobs array victim shard
-    jobs="$(examples/many-machines/slurm.sh scenes/features/glass-solids.toml "$work/slurm.plan" "$work/slurm.png")"
-    say "$jobs"
-    array="${jobs#shards: }" array="${array%%,*}"
+    local jobs array victim task
+    jobs="$(SBATCH_OPTIONS="--time=2" examples/many-machines/slurm.sh "$scene" "$noise" 4 "$work/slurm.png" 2>/dev/null)"
+    say "$jobs, with a time limit of two minutes"
+    array="${jobs#workers: }" array="${array%%,*}"
 
-    victim="$(shard_process 1 slurm)"
-    say "kill -9 of shard 1 after its first checkpoint"
-    kill -9 "$victim"
+    wait_for_part slurm
+    say "kill -9 of a worker"
+    kill -9 "$(workers slurm | head -n 1)"
 
-    shard="$(squeue -h -t R -w node2 -o %K)"
-    shard_process "$shard" slurm > /dev/null
-    say "node2 is drained, and its task (shard $shard) put back into the queue"
+    task=""
+    until [ -n "$task" ]; do sleep 1; task="$(squeue -h -t R -w node2 -o %K)"; done
+    say "node2 is drained, and its task (worker $task) put back into the queue"
     scontrol update NodeName=node2 State=DRAIN Reason=maintenance
-    scontrol requeue "${array}_$shard"
-    sinfo -h -N -o '        %N %t'
+    scontrol requeue "${array}_$task"
 
-    shard="$(squeue -h -t R -w node3 -o %K)"
-    until [ -n "$shard" ]; do sleep 1; shard="$(squeue -h -t R -w node3 -o %K)"; done
-    shard_process "$shard" slurm > /dev/null
-    # All processes of the node at once: daemon, job step, script, command.
-    say "node3 is lost (slurmd, task and shard $shard are killed)"
-    victim="$(shard_process "$shard" slurm)"
+    task=""
+    until [ -n "$task" ]; do sleep 1; task="$(squeue -h -t R -w node3 -o %K)"; done
+    # All processes of the node at once: daemon, job step, script, worker.
+    say "node3 is lost (slurmd, task and worker $task are killed)"
     local script step
-    script="$(ps -o ppid= -p "$victim" | tr -d ' ')"
-    step="$(ps -o ppid= -p "$script" | tr -d ' ')"
-    kill -9 "${slurmd[2]}" "$step" "$script" "$victim"
+    for victim in $(workers slurm); do
+        script="$(ps -o ppid= -p "$victim" | tr -d ' ')"
+        step="$(ps -o ppid= -p "$script" | tr -d ' ')"
+        grep -q "SLURMD_NODENAME=node3" -z "/proc/$victim/environ" || continue
+        kill -9 "${slurmd[2]}" "$step" "$script" "$victim"
+    done
     scontrol update NodeName=node3 State=DOWN Reason=lost
     sinfo -h -N -o '        %N %t'
     sleep 5
@@ -170,20 +174,9 @@ slurm() {
 
     wait_for_jobs
     say "logs of the tasks"
-    for log in "$work"/slurm-[1-8].log "$work/slurm-merge.log"; do
-        grep -hv '^\([0-9.]* % .* left\|$\)' "$log" | sed "s|$work/||g; s|^|        $(basename "$log" .log): |"
-    done
+    grep -h 'exit status' "$work"/slurm-worker-*.log | sort | sed 's/^/        /'
+    grep -h '8-bit levels\|finished' "$work"/slurm-worker-*.log "$work/slurm-merge.log" | sort -u | sed "s|$work/||g; s/^/        /"
     equal slurm
-
-    # One shard of some three minutes of processor time. Slurm ends tasks up to a minute after their limit.
-    plan limit 1 "${LIMIT_NOISE:-0.12}" > /dev/null
-    say "a time limit of two minutes"
-    SBATCH_OPTIONS="--time=2" examples/many-machines/slurm.sh scenes/features/glass-solids.toml "$work/limit.plan" "$work/limit.png"
-    wait_for_jobs
-    grep 'exit status' "$work/limit-1.log" | sed 's/^/        /'
-    grep -q 'exit status 143' "$work/limit-1.log" || { echo "the shard was not stopped at its limit" >&2; exit 1; }
-    "$ZERKALO" render scenes/features/glass-solids.toml --plan "$work/limit.plan" -o "$work/one.png" 2>/dev/null
-    equal limit
 }
 
 for engine in "$@"; do

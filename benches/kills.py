@@ -45,7 +45,7 @@ def command(kind, name):
         files = ["-o", f"{name}.png", "--checkpoint", f"{name}.zk", "--resume", f"{name}.zk"]
         return [ZERKALO, "render", "room.toml", *files, "--noise", "0.25", "--checkpoint-interval", "0.3", *SIZE]
     if kind == "shard":
-        return [ZERKALO, "render", "room.toml", "--plan", "job.plan", "--shard", "1", "-o", f"{name}.zk", "--threads", "1"]
+        return [ZERKALO, "render", "room.toml", "--plan", last_plan, "--shard", "1", "-o", f"{name}.zk", "--threads", "1"]
     return [ZERKALO, "merge", "job.plan", "-o", f"{name}.png"]
 
 
@@ -203,9 +203,9 @@ def dashboard(number):
 
 start = time.time()
 print(f"{quietly([ZERKALO, '--version']).stdout.split(chr(10))[0]}, {os.cpu_count()} cores; {time.strftime('%F')}; {'a full disk of its own' if has_disk else 'no full disk'}", flush=True)
-quietly([ZERKALO, "plan", "room.toml", *SIZE[:2], "--noise", "0.2", "--pilot", "2", "--shards", "3", "-o", "job.plan", "--base", "job-0.zk"])
-for shard in "123":
-    quietly([*command("shard", f"job-{shard}")[:6], shard, "-o", f"job-{shard}.zk"])
+quietly([ZERKALO, "plan", "room.toml", *SIZE[:2], "--noise", "0.2", "--shards", "3", "-o", "job.plan"])
+quietly([ZERKALO, "work", "room.toml", "job.plan"])
+last_plan = max((name for name in os.listdir(".") if name.endswith(".plan")), key=os.path.getmtime)
 wholes, spans = {}, {}
 for kind in ("render", "shard", "merge"):
     began = time.time()

@@ -1,21 +1,23 @@
-//! Simulation of renders on many machines. A picture is divided into shards, which the machines
-//! trace in parallel. The result is the time until the picture is written, as a function of the
-//! number of shards. The machines have different speeds, and they fail and are restarted.
+//! Simulation of renders on many machines: workers take the shards of each round in turn, and plan
+//! the next round when all are complete. The result is the time until the picture is written.
 //!
 //!     cargo bench -p zerkalo-benches --bench scaling -- [KEY=VALUE ..]
 //!
-//! The keys are the fields of [`Setup`], measured as docs/many-machines.md describes. The model:
+//! The keys are the fields of [`Setup`], measured as docs/many-machines.md describes. Without keys,
+//! the tables are for a frame of half an hour and one of 24 hours (`total`). The model:
 //!
-//! - One machine renders the pilot (a first render that predicts the sample counts) and plans the
-//!   shards. One machine also merges their results.
-//! - The workflow engine starts `starts_per_second` tasks a second. Each task reads and compiles
-//!   the scene, traces its shard, and writes the samples to the shared file system.
+//! - The engine starts `starts_per_second` workers a second, once. Each reads and compiles the scene.
+//! - A worker that is free takes the next shard. Shards shrink linearly to a tenth, as in
+//!   `crates/render/src/plan/division.rs`; their real work differs from the expected one by
+//!   `misjudged`.
+//! - The worker reads the base of its tiles, traces, and writes its part. The parts of a round
+//!   together are one film.
 //! - The speed of a machine has a log-normal distribution; the standard deviation of its logarithm
 //!   is `spread`. A fraction `slow` of the machines has a third of this speed.
 //! - A machine fails after a time with an exponential distribution. After `requeue_seconds` the
-//!   engine notices the failure, and the shard continues from its latest checkpoint on another
-//!   machine.
-//! - If there are more shards than machines, each machine that finishes a shard gets the next one.
+//!   shard continues from its latest checkpoint on another machine.
+//! - After the last shard of a round, one worker reads the reports in the headers and plans the next
+//!   round, in `planning_seconds`; after the last round, the parts are merged.
 //!
 //! Random numbers have fixed seeds; the output is the same on every machine.
 
@@ -25,30 +27,27 @@ use std::collections::BinaryHeap;
 /// scene glass-solids with 3840x2160 pixels, traced to a noise of 0.25 8-bit levels.
 #[derive(Clone, Copy, Debug)]
 struct Setup {
-    /// Seconds that the whole picture takes on one machine.
+    /// Seconds that the whole picture takes on one machine; 0 for both tables.
     total: f64,
-    /// Fraction of all rays that are traced before the last round of shards. In a render with one
-    /// round, the pilot traces these rays; in a render with two rounds, the pilot and the first
-    /// round.
-    pilot: f64,
-    /// Fraction of all rays that the pilot traces in a render with two rounds.
-    first_pilot: f64,
-    /// Seconds to start a task: start of the program, reading and compilation of the scene.
+    /// Shards for each machine.
+    per_machine: f64,
+    /// Seconds to start a worker: start of the program, reading and compilation of the scene.
     start_seconds: f64,
-    /// Size in megabytes of a shard's film file if it holds samples of all tiles.
-    part_mb: f64,
-    /// Mean number of blocks (16 samples of every pixel of a tile) that the shards together trace
-    /// in a tile. With more shards than blocks, a shard's file holds samples of some tiles only.
-    blocks: f64,
-    /// Rate at which a shard's file is written, in megabytes per second.
-    write_mb_s: f64,
-    /// Rate at which the shards' files are merged, in megabytes per second.
+    /// Seconds to find and take a shard.
+    take_seconds: f64,
+    /// Size of the film file in megabytes.
+    film_mb: f64,
+    /// Rate at which a worker reads its base and writes its part, in megabytes per second.
+    part_mb_s: f64,
+    /// Rate at which the parts are merged, in megabytes per second.
     merge_mb_s: f64,
-    /// Seconds to write the picture or the merged film.
+    /// Seconds to write the picture.
     picture_seconds: f64,
-    /// Ratio of the largest shard's work to the mean work of a shard, minus 1.
-    imbalance: f64,
-    /// Number of tasks that the engine starts per second.
+    /// Seconds to plan a round, with the pause until workers notice.
+    planning_seconds: f64,
+    /// Standard deviation of the real work of a shard, as a share of the expected one.
+    misjudged: f64,
+    /// Number of workers that the engine starts per second.
     starts_per_second: f64,
     /// Standard deviation of the natural logarithm of the machines' speeds.
     spread: f64,
@@ -56,23 +55,23 @@ struct Setup {
     slow: f64,
     /// Mean time between failures of a machine, in hours.
     mtbf_hours: f64,
-    /// Seconds from the failure of a machine until the engine starts its shard again.
+    /// Seconds from the failure of a machine until its shard continues.
     requeue_seconds: f64,
     /// Longest interval between two checkpoints of a shard, in seconds.
     checkpoint_seconds: f64,
 }
 
 const SETUP: Setup = Setup {
-    total: 1_785.0,
-    pilot: 0.30,
-    first_pilot: 0.03,
+    total: 0.0,
+    per_machine: 16.0,
     start_seconds: 0.2,
-    part_mb: 600.0,
-    blocks: 13.0,
-    write_mb_s: 300.0,
-    merge_mb_s: 200.0,
+    take_seconds: 0.02,
+    film_mb: 600.0,
+    part_mb_s: 300.0,
+    merge_mb_s: 500.0,
     picture_seconds: 3.0,
-    imbalance: 0.02,
+    planning_seconds: 0.6,
+    misjudged: 0.1,
     starts_per_second: 20.0,
     spread: 0.1,
     slow: 0.02,
@@ -80,6 +79,12 @@ const SETUP: Setup = Setup {
     requeue_seconds: 60.0,
     checkpoint_seconds: 60.0,
 };
+
+/// Shares of all rays at the ends of the rounds, as in the larger frames of
+/// `tests/shards.rs`: uniform, two to three adaptive rounds.
+const ROUNDS: [f64; 4] = [0.03, 0.17, 0.75, 1.0];
+/// Share by which the last shard is smaller than the first one.
+const DECREASE: f64 = 0.9;
 
 /// Random number generator SplitMix64 (Steele, Lea, Flood 2014).
 struct Random(u64);
@@ -103,56 +108,38 @@ impl Random {
     }
 }
 
-/// Durations of the phases of one simulated render, in seconds.
+/// Durations of the parts of one simulated render, in seconds.
 #[derive(Clone, Copy, Default)]
 struct Times {
-    pilot: f64,
-    shards: f64,
+    rounds: f64,
     merge: f64,
 }
 
 impl Times {
     fn total(&self) -> f64 {
-        self.pilot + self.shards + self.merge
+        self.rounds + self.merge
     }
 }
 
 impl Setup {
-    /// Returns the size in megabytes of one film file of a render with `shards` shards. `blocks` is
-    /// the mean number of blocks of samples in a tile. With fewer shards than blocks, every file
-    /// holds samples of all tiles.
-    fn part(&self, shards: usize, blocks: f64) -> f64 {
-        self.part_mb * (blocks / shards as f64).min(1.0)
-    }
-
-    /// Returns the seconds from the start of the first task to the end of the last one. `work` is
-    /// the sum of all shards' seconds on a machine of mean speed. `part` is the size of a shard's
-    /// file in megabytes.
-    fn shards(
+    /// Traces a round with the given `work`, seconds on a machine of mean speed, from the time
+    /// `begin` on. `free` are the times at which the workers become free. Returns its end.
+    fn round(
         &self,
         work: f64,
-        shards: usize,
-        machines: usize,
-        part: f64,
+        begin: f64,
+        (free, speeds): (&mut BinaryHeap<Free>, &[f64]),
         random: &mut Random,
     ) -> f64 {
-        let speeds: Vec<f64> = (0..machines)
-            .map(|_| {
-                let slow = if random.unit() < self.slow { 1.0 / 3.0 } else { 1.0 };
-                slow * (self.spread * random.normal()).exp()
-            })
-            .collect();
-        // Heap of the machines by the time at which they become free. The earliest one is at the
-        // top.
-        let mut free: BinaryHeap<Free> =
-            (0..machines).map(|machine| Free { at: 0.0, machine }).collect();
+        let shards = (speeds.len() as f64 * self.per_machine) as usize;
+        let part = self.film_mb / shards as f64;
         let mut end: f64 = 0.0;
         for shard in 0..shards {
             let Some(Free { at, machine }) = free.pop() else { break };
-            let mut now = at.max(shard as f64 / self.starts_per_second) + self.start_seconds;
-            // The model assumes that the first shard is the largest one.
-            let excess = if shard == 0 { 1.0 + self.imbalance } else { 1.0 };
-            let mut left = work / shards as f64 * excess;
+            let mut now = at.max(begin) + self.take_seconds + part / self.part_mb_s;
+            let size = 1.0 - DECREASE * (shard as f64 + 0.5) / shards as f64;
+            let share = size / (1.0 - 0.5 * DECREASE) / shards as f64;
+            let mut left = work * share * (self.misjudged * random.normal()).exp();
             let mut speed = speeds[machine];
             loop {
                 let failure = random.exponential(3600.0 * self.mtbf_hours);
@@ -167,44 +154,44 @@ impl Setup {
                 now += failure + self.requeue_seconds + self.start_seconds;
                 speed = 1.0;
             }
-            now += part / self.write_mb_s;
+            now += part / self.part_mb_s;
             end = end.max(now);
             free.push(Free { at: now, machine });
         }
         end
     }
 
-    /// Simulates a render and returns the durations of its phases. If `rounds` is 1, these are
-    /// pilot, shards and merge; otherwise there are two rounds of shards.
-    fn render(&self, rounds: usize, shards: usize, machines: usize, random: &mut Random) -> Times {
-        let ends = match rounds {
-            1 => vec![self.pilot, 1.0],
-            _ => vec![self.first_pilot, self.pilot, 1.0],
-        };
-        let mut times =
-            Times { pilot: self.start_seconds + ends[0] * self.total, ..Times::default() };
-        for pair in ends.windows(2) {
-            let share = pair[1] - pair[0];
-            let part = self.part(shards, self.blocks * share / (1.0 - self.pilot));
-            times.shards += self.shards(share * self.total, shards, machines, part, random);
-            times.merge +=
-                (part * shards as f64 + self.part_mb) / self.merge_mb_s + self.picture_seconds;
+    fn render(&self, total: f64, machines: usize, random: &mut Random) -> Times {
+        let speeds: Vec<f64> = (0..machines)
+            .map(|_| {
+                let slow = if random.unit() < self.slow { 1.0 / 3.0 } else { 1.0 };
+                slow * (self.spread * random.normal()).exp()
+            })
+            .collect();
+        let started = |machine: usize| machine as f64 / self.starts_per_second + self.start_seconds;
+        let mut free: BinaryHeap<Free> =
+            (0..machines).map(|machine| Free { at: started(machine), machine }).collect();
+        let (mut now, mut before) = (0.0, 0.0);
+        for end in ROUNDS {
+            now = self.round((end - before) * total, now, (&mut free, &speeds), random);
+            now += self.planning_seconds;
+            before = end;
         }
-        times
+        Times { rounds: now, merge: self.film_mb / self.merge_mb_s + self.picture_seconds }
     }
 
     fn set(&mut self, key: &str, value: f64) -> bool {
         let field = match key {
             "total" => &mut self.total,
-            "pilot" => &mut self.pilot,
-            "first_pilot" => &mut self.first_pilot,
+            "per_machine" => &mut self.per_machine,
             "start_seconds" => &mut self.start_seconds,
-            "part_mb" => &mut self.part_mb,
-            "blocks" => &mut self.blocks,
-            "write_mb_s" => &mut self.write_mb_s,
+            "take_seconds" => &mut self.take_seconds,
+            "film_mb" => &mut self.film_mb,
+            "part_mb_s" => &mut self.part_mb_s,
             "merge_mb_s" => &mut self.merge_mb_s,
             "picture_seconds" => &mut self.picture_seconds,
-            "imbalance" => &mut self.imbalance,
+            "planning_seconds" => &mut self.planning_seconds,
+            "misjudged" => &mut self.misjudged,
             "starts_per_second" => &mut self.starts_per_second,
             "spread" => &mut self.spread,
             "slow" => &mut self.slow,
@@ -242,20 +229,17 @@ impl Ord for Free {
 const RENDERS: usize = 200;
 
 /// Prints a row of the table: median and 95th percentile of the render time with `machines`
-/// machines and `per_machine` shards for each of them.
-fn row(setup: &Setup, rounds: usize, machines: usize, per_machine: usize) {
-    let mut random = Random(machines as u64 * 1000 + per_machine as u64);
-    let mut times: Vec<Times> = (0..RENDERS)
-        .map(|_| setup.render(rounds, machines * per_machine, machines, &mut random))
-        .collect();
+/// machines.
+fn row(setup: &Setup, total: f64, machines: usize) {
+    let mut random = Random(machines as u64 * 1000);
+    let mut times: Vec<Times> =
+        (0..RENDERS).map(|_| setup.render(total, machines, &mut random)).collect();
     times.sort_by(|a, b| a.total().total_cmp(&b.total()));
     let (median, late) = (times[RENDERS / 2], times[RENDERS * 95 / 100]);
-    let speedup = setup.total / median.total();
+    let speedup = total / median.total();
     println!(
-        "| {machines} | {} | {:.0} | {:.0} | {:.0} | {:.0} | {:.0} | {speedup:.1} | {:.0} % |",
-        machines * per_machine,
-        median.pilot,
-        median.shards,
+        "| {machines} | {:.0} | {:.0} | {:.0} | {:.0} | {speedup:.1} | {:.0} % |",
+        median.rounds,
         median.merge,
         median.total(),
         late.total(),
@@ -273,14 +257,13 @@ fn main() {
         }
     }
     println!("{setup:#?}");
-    for (rounds, per_machine) in [(1, 1), (2, 1), (2, 4)] {
-        println!("\n{rounds} round(s), {per_machine} shard(s) a machine; times in seconds\n");
-        println!(
-            "| machines | shards | pilot | shards | merge | total | 95 % within | speedup | efficiency |"
-        );
-        println!("|---|---|---|---|---|---|---|---|---|");
+    let totals = if setup.total > 0.0 { vec![setup.total] } else { vec![1785.0, 86_400.0] };
+    for total in totals {
+        println!("\nA frame of {total} s on one machine; times in seconds\n");
+        println!("| machines | rounds | merge | total | 95 % within | speedup | efficiency |");
+        println!("|---|---|---|---|---|---|---|");
         for exponent in 0..=10 {
-            row(&setup, rounds, 1 << exponent, per_machine);
+            row(&setup, total, 1 << exponent);
         }
     }
 }

@@ -1,26 +1,29 @@
 #!/usr/bin/env bash
-# Renders a plan by GNU parallel on the hosts of a file, one per line (`:` is this machine), and merges the parts.
+# Renders a scene by GNU parallel on the hosts of a file, one per line (`:` is this machine), from scene to picture.
 #
-#   zerkalo plan scene.toml --noise 0.25 --shards 8 -o job.plan
-#   examples/many-machines/parallel.sh scene.toml job.plan hosts final.png
+#   examples/many-machines/parallel.sh scene.toml 0.25 hosts final.png
 #
-# Scene, plan and parts are on a file system that all hosts mount under the same path. A command that fails, is
-# killed, or loses its host is started again on another host, where it continues from its part file. Options of
-# `zerkalo render` go into RENDER_OPTIONS, such as "--threads 8".
+# Scene and picture are on a file system that all hosts mount under the same path. The plan and the parts are beside the
+# picture, as final.plan and so on; the same command again continues them. Each host runs a worker, which lives through
+# all rounds. A worker that fails, is killed, or loses its host is started again on another host. Number of shards: SHARDS.
+# Options of `zerkalo plan` go into PLAN_OPTIONS, those of `zerkalo work` into WORK_OPTIONS, such as "--threads 8".
 set -euo pipefail
 
-[ $# -eq 4 ] || { echo "usage: $0 SCENE PLAN HOSTS OUTPUT" >&2; exit 2; }
-scene="$(realpath "$1")" plan="$(realpath "$2")" hosts="$3" output="$4"
+[ $# -eq 4 ] || { echo "usage: $0 SCENE NOISE HOSTS OUTPUT" >&2; exit 2; }
+scene="$(realpath "$1")" noise="$2" hosts="$3" output="$(realpath "$4")"
 zerkalo="${ZERKALO:-zerkalo}"
-read -ra options <<< "${RENDER_OPTIONS:-}"
-parts="${plan%.plan}"
-shards="$(sed -n 's/^shards //p' "$plan")"
+read -ra plan_options <<< "${PLAN_OPTIONS:-}"
+read -ra work_options <<< "${WORK_OPTIONS:-}"
+job="${output%.*}"
+workers="$(grep -c . "$hosts")"
+[ -e "$job.plan" ] || "$zerkalo" plan "$scene" --noise "$noise" --shards "${SHARDS:-$((8 * workers))}" \
+    "${plan_options[@]}" -o "$job.plan"
 
 # Paths are inputs of GNU parallel, which quotes them for the shells of the hosts. `--retries` counts all attempts.
-# `--halt soon,fail=1` gives up when a shard has failed that often.
+# Other workers trace the shards of one that has failed that often.
 # shellcheck disable=SC1083
-parallel --sshloginfile "$hosts" --jobs "${JOBS_PER_HOST:-1}" --retries 5 --halt soon,fail=1 --joblog "$parts.joblog" \
-    exec {1} render {2} --plan {3} --shard {4} -o {5}-{4}.zk "${options[@]}" \
-    ::: "$zerkalo" ::: "$scene" ::: "$plan" :::: <(seq "$shards") ::: "$parts"
+parallel --sshloginfile "$hosts" --jobs "${JOBS_PER_HOST:-1}" --retries 5 --joblog "$job.joblog" \
+    exec {1} work {2} {3} "${work_options[@]}" \
+    ::: "$zerkalo" ::: "$scene" ::: "$job.plan" :::: <(seq "$((workers * ${JOBS_PER_HOST:-1}))") || true
 
-"$zerkalo" merge "$plan" -o "$output"
+"$zerkalo" merge "$job.plan" -o "$output"

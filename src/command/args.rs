@@ -70,13 +70,20 @@ pub struct TerminalArgs {
     bandwidth: Option<f64>,
 }
 
-/// Options of every command that renders.
+/// Option of every command that traces.
 #[derive(Clone, Copy, Debug, Args)]
-pub struct ComputeArgs {
+pub struct ThreadArgs {
     /// Number of tracing threads, at most 16, or four per processor if that is more [default: one
     /// per processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
     threads: Option<u16>,
+}
+
+/// Options of every command that renders.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct ComputeArgs {
+    #[command(flatten)]
+    threads: ThreadArgs,
     /// Random seed; equal seeds give equal pictures
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub seed: u64,
@@ -128,6 +135,10 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Divide a render into shards: parts that other processes or machines trace
     Plan(Box<PlanArgs>),
+    /// Trace shards of a plan together with other processes, through all rounds
+    Work(WorkArgs),
+    /// Print how far a plan is: percent, hours left, late and failed shards
+    Status(StatusArgs),
     /// Merge the film files of the shards of a plan into one picture
     Merge(MergeArgs),
     /// Show renders of other processes or machines while they run, from their film files
@@ -214,7 +225,7 @@ pub struct RenderArgs {
     /// Trace the samples of a plan, which `zerkalo plan` has written
     #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "exposure", "tone", "spp", "noise", "rmse", "error", "time", "seed", "precision", "sampler", "uniform", "stats"])]
     pub plan: Option<PathBuf>,
-    /// Trace only this shard of the plan, into a .zk file; 0 is the base, the pilot's samples
+    /// Trace only this shard of the plan, into a .zk file
     #[arg(
         long,
         value_name = "K",
@@ -253,8 +264,14 @@ pub struct PlanArgs {
     #[arg(required_unless_present = "from", conflicts_with = "from")]
     pub scene: Option<PathBuf>,
     /// The plan file to write
-    #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    #[arg(
+        short,
+        long,
+        value_name = "FILE.plan",
+        required_unless_present = "from",
+        conflicts_with = "from"
+    )]
+    pub output: Option<PathBuf>,
     #[command(flatten)]
     pub clobber: ClobberArgs,
     #[command(flatten)]
@@ -262,22 +279,17 @@ pub struct PlanArgs {
     /// Target: estimated RMSE of the displayed picture, in 8-bit levels
     #[arg(long, value_name = "LEVELS", value_parser = positive, default_value_t = 0.5, allow_negative_numbers = true)]
     pub noise: f64,
-    /// Number of shards
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SHARDS)), allow_negative_numbers = true)]
-    pub shards: u32,
-    /// Noise at which the pilot render ends, in 8-bit levels [default: twice the target]
-    #[arg(long, value_name = "LEVELS", value_parser = positive, conflicts_with = "from", allow_negative_numbers = true)]
-    pub pilot: Option<f64>,
-    /// File for the samples of the pilot [default: the plan's name with -0.zk]
-    #[arg(long, value_name = "FILE.zk", conflicts_with = "from")]
-    pub base: Option<PathBuf>,
-    /// Plan the next round: continue this merged film, which takes the place of the pilot
-    #[arg(long, value_name = "FILE.zk", conflicts_with_all = ["size", "exposure", "tone", "seed", "precision", "sampler"])]
+    /// Number of shards; eight to sixteen for each machine
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SHARDS)), required_unless_present = "from", allow_negative_numbers = true)]
+    pub shards: Option<u32>,
+    /// Plan a further round of this finished job, to a lower noise
+    #[arg(long, value_name = "PLAN", conflicts_with_all = ["size", "exposure", "tone", "seed", "precision", "sampler"])]
     pub from: Option<PathBuf>,
     #[command(flatten)]
     pub picture: PictureArgs,
-    #[command(flatten)]
-    pub compute: ComputeArgs,
+    /// Random seed; equal seeds give equal pictures
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    pub seed: u64,
     #[command(flatten)]
     pub precision: PrecisionArgs,
     /// Sampler: sobol spreads samples evenly, random is for comparison
@@ -289,8 +301,8 @@ pub struct PlanArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = include_str!("help/merge.txt").trim_end())]
 pub struct MergeArgs {
-    /// The plan, which stands for the film files of its shards beside it: job.plan for job-0.zk,
-    /// job-1.zk and so on; or film files in any order
+    /// The plan, which stands for the film files of its last round beside it: job.plan for
+    /// job-1.zk, job-2.zk and so on; or film files in any order
     #[arg(required = true, value_name = "PLAN|PART.zk")]
     pub parts: Vec<PathBuf>,
     /// The file to write: a picture (.png, .exr) or a film (.zk)
@@ -352,7 +364,7 @@ pub struct MeasureArgs {
 #[command(after_help = include_str!("help/watch.txt").trim_end())]
 pub struct WatchArgs {
     /// Film files of the shards of one plan, or one checkpoint; a plan file stands for the film
-    /// files beside it (job.plan: job-0.zk, job-1.zk, ..)
+    /// files of its latest round (job.plan: job-1.zk, job-2.zk, ..)
     #[arg(required = true, value_name = "FILE.zk")]
     pub files: Vec<PathBuf>,
     #[command(flatten)]
@@ -398,6 +410,30 @@ pub struct ScenesArgs {
     pub file: Option<PathBuf>,
 }
 
+/// Arguments of `zerkalo work`.
+#[derive(Debug, Args)]
+#[command(after_help = include_str!("help/work.txt").trim_end())]
+pub struct WorkArgs {
+    /// The scene file of the plan
+    pub scene: PathBuf,
+    /// The plan, which `zerkalo plan` has written; parts and later plans are written beside it
+    pub plan: PathBuf,
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+    /// Acceleration structure, instead of the scene's; every choice renders the same picture
+    #[arg(long, value_parser = choice(Acceleration::ALL.map(|a| (a.name(), None, a))))]
+    pub acceleration: Option<Acceleration>,
+}
+
+/// Arguments of `zerkalo status`.
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    /// The plan
+    pub plan: PathBuf,
+    #[command(flatten)]
+    pub json: JsonArgs,
+}
+
 /// Arguments of `zerkalo info`.
 #[derive(Debug, Args)]
 #[command(after_help = include_str!("help/info.txt").trim_end())]
@@ -429,10 +465,17 @@ impl TerminalArgs {
     }
 }
 
+impl ThreadArgs {
+    /// Returns the number of threads that trace rays.
+    pub fn count(&self) -> usize {
+        self.threads.map_or_else(processors, |given| usize::from(given).min(max_threads()))
+    }
+}
+
 impl ComputeArgs {
     /// Returns the number of threads that trace rays.
     pub fn threads(&self) -> usize {
-        self.threads.map_or_else(processors, |given| usize::from(given).min(max_threads()))
+        self.threads.count()
     }
 }
 

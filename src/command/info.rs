@@ -8,7 +8,7 @@ use std::path::Path;
 use zerkalo_render::SampleInputs;
 use zerkalo_render::export::{noise_of_text, scene_hash, settings_text};
 use zerkalo_render::image_file::FileMetadata;
-use zerkalo_render::plan::{BASE, Part, Plan, is_plan_file};
+use zerkalo_render::plan::{Part, Plan, PlanHead, is_plan_file};
 use zerkalo_scene::value::sanitized;
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
@@ -61,13 +61,12 @@ fn results(origin: &FileMetadata, file: &Path) -> Value {
 /// Returns the description of a plan, in the form of a file's metadata.
 fn of_plan(plan: &Plan) -> FileMetadata {
     let settings = &plan.settings;
-    let base = match settings.base_plan {
-        Some(merged) => format!("merged film of the plan {merged:016x}"),
-        None => "pilot".to_string(),
-    };
-    let (total, base_rays) = (plan.all_rays(), plan.rays(BASE));
-    let each = (total - base_rays) / f64::from(settings.shards);
-    let rays = format!("{total:.3e}: base {base_rays:.3e}, each shard about {each:.3e}");
+    let base = settings.base_plan.map_or("none".to_string(), |plan| format!("plan {plan:016x}"));
+    let (base_rays, total) = (settings.base_rays as f64, settings.total_rays);
+    let rays = format!(
+        "{:.3e} in this round, {base_rays:.3e} before, {total:.3e} in all rounds",
+        plan.rays()
+    );
     let sampler = settings.sampler.name();
     let method = settings_text(sampler, settings.precision, true, &settings.display);
     let entries = [
@@ -75,7 +74,7 @@ fn of_plan(plan: &Plan) -> FileMetadata {
         ("Scene hash", settings.scene_hash.clone()),
         ("Seed", settings.seed.to_string()),
         ("Settings", method),
-        ("Plan", target(plan)),
+        ("Plan", target(&plan.head())),
         ("Base", base),
         ("Expected rays", rays),
         ("Checksum", format!("{:016x}", plan.checksum())),
@@ -85,10 +84,11 @@ fn of_plan(plan: &Plan) -> FileMetadata {
 }
 
 /// Formats shards, samples per pixel, noise target and expected noise of a plan.
-fn target(plan: &Plan) -> String {
+fn target(plan: &PlanHead) -> String {
     let settings = &plan.settings;
     format!(
-        "{} shards, {:.2} samples per pixel, target {} 8-bit levels of noise, expected {:.3}",
+        "round {}, {} shards, {:.2} samples per pixel, target {} 8-bit levels of noise, expected {:.3}",
+        settings.round,
         settings.shards,
         plan.spp(),
         settings.noise_levels,

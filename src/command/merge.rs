@@ -21,11 +21,16 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         }
     })?;
     let mut merged = Merged::of_files(&args.parts, args.partial)?;
-    let report = Report::of_film(&merged.film, &merged.header.weights, &merged.header.display);
+    let (film, header) = (&merged.film, &merged.header);
+    let mut report = Report::of_film(film, &header.weights, &header.display);
+    if args.partial {
+        report.noise = film.noise_of_sampled(&header.weights, &header.display);
+    }
     update_metadata(&mut merged.header, &report);
     is_writing.store(true, Ordering::Release);
     save::persist(|| output.write(&merged.film, &merged.header))?;
     let plan = &merged.part.plan;
+    let rays = plan.settings.base_rays + merged.part.rays;
     let path = args.output.display();
     if args.json.json {
         return print_json(&json!({
@@ -35,38 +40,30 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
             "spp_max": report.spp.max,
             "noise_levels": report.noise.map(|noise| noise.rmse.levels),
             "rmse_linear": report.noise.map(|noise| noise.rmse.linear),
-            "rays": merged.part.rays,
+            "rays": rays,
             "missing": merged.part.missing(),
         }));
     }
-    print_line(&format!("{path}  {}  {} rays", part_file::summary(&report), merged.part.rays))?;
+    print_line(&format!("{path}  {}  {rays} rays", part_file::summary(&report)))?;
     if let Some(missing) = merged.part.missing() {
         print_line(&format!(
             "missing of {} shards: {missing}; {}",
             plan.settings.shards,
-            cost(&report, plan.predicted_levels)
-        ))?;
-    } else if let Some(noise) = report.noise
-        && noise.rmse.levels > plan.settings.noise_levels
-    {
-        print_line(&format!(
-            "the noise is {:.1} % above the target of {}: merge to a .zk file, and plan another \
-             round by `zerkalo plan --from`",
-            100.0 * (noise.rmse.levels / plan.settings.noise_levels - 1.0),
-            plan.settings.noise_levels
+            cost(&report, &merged)
         ))?;
     }
     Ok(())
 }
 
-/// Formats the noise of the merged picture, which lacks shards, and the noise predicted for all
-/// shards.
-fn cost(report: &Report, predicted_levels: f64) -> String {
-    match report.noise {
-        Some(noise) => format!(
-            "noise {:.3} instead of about {predicted_levels:.3} 8-bit levels",
-            noise.rmse.levels
-        ),
-        None => "noise unknown, because some tiles have no samples".to_string(),
+/// Formats the noise of the merged picture, which lacks shards, without its empty tiles.
+fn cost(report: &Report, merged: &Merged) -> String {
+    let film = &merged.film;
+    let empty = (0..film.tile_count()).filter(|tile| film.counts(*tile) == [0; 2]).count();
+    let noise = report.noise.map_or("unknown noise".to_string(), |noise| {
+        format!("noise {:.3} 8-bit levels", noise.rmse.levels)
+    });
+    match empty {
+        0 => noise,
+        empty => format!("{noise} without {empty} of {} tiles, which are black", film.tile_count()),
     }
 }

@@ -24,7 +24,9 @@ mod save;
 mod scenes;
 mod shard;
 mod stats;
+mod status;
 mod watch;
+mod work;
 
 pub use cpu::require as require_cpu;
 
@@ -96,6 +98,8 @@ pub fn main() -> ExitCode {
     let result = match &cli.command {
         Some(Command::Render(args)) => render::run(args, started),
         Some(Command::Plan(args)) => plan::run(args),
+        Some(Command::Work(args)) => work::run(args),
+        Some(Command::Status(args)) => status::run(args),
         Some(Command::Merge(args)) => merge::run(args),
         Some(Command::Watch(args)) => watch::run(args, config.preferences),
         Some(Command::Measure(args)) => measure::run(args),

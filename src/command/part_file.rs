@@ -4,12 +4,11 @@ use crate::command::Failure;
 use crate::command::progress::{counts, noise};
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use zerkalo_render::RenderState;
 use zerkalo_render::export::{Provenance, film_header};
 use zerkalo_render::film::Film;
 use zerkalo_render::film::file::{EncodedFilm, FilmFileHeader};
 use zerkalo_render::image_file::{Depth, ImageOutput};
-use zerkalo_render::plan::Part;
+use zerkalo_render::plan::{Part, ShardRender};
 use zerkalo_render::session::Report;
 use zerkalo_scene::disk::{Existing, Replacement, WriteError};
 
@@ -57,8 +56,13 @@ pub struct Written {
     pub report: Report,
 }
 
-/// Writes the film of `state`, which holds the samples of `part`.
-pub fn write(output: &FilmOutput, state: &RenderState, part: &Part) -> Result<Written, WriteError> {
+/// Writes the film of `render`, which holds the samples of `part`.
+pub fn write(
+    output: &FilmOutput,
+    render: &ShardRender,
+    part: &Part,
+) -> Result<Written, WriteError> {
+    let state = &render.state;
     let settings = &part.plan.settings;
     let provenance = Provenance {
         source: settings.source.clone(),
@@ -69,6 +73,7 @@ pub fn write(output: &FilmOutput, state: &RenderState, part: &Part) -> Result<Wr
     let report = Report::of_film(&state.film, &state.weights, &settings.display);
     let mut header = film_header(state, &report, &provenance);
     part.record(&mut header);
+    render.record(&mut header, part.is_complete());
     output.write(&state.film, &header).map(|file| Written { file, report })
 }
 

@@ -7,17 +7,18 @@ use crate::command::args::RenderArgs;
 use crate::command::part_file::{self, FilmOutput};
 use crate::command::progress::Progress;
 use crate::command::{Failure, handle_signals, print_line, read_scene, save, warn};
+use std::fs::File;
+use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_render::export::scene_hash;
-use zerkalo_render::film::Film;
 use zerkalo_render::film::file::FilmReader;
-use zerkalo_render::plan::{BASE, Part, PartShard, Plan, ShardRender};
+use zerkalo_render::plan::{Job, Part, PartShard, PlanHead, ShardRender};
 use zerkalo_render::{FileError, Options, RenderState};
-use zerkalo_scene::Document;
-use zerkalo_scene::disk::WriteError;
+use zerkalo_scene::disk::{Claim, Existing, WriteError};
+use zerkalo_scene::{Acceleration, Document};
 use zerkalo_terminal::Signals;
 
 /// Time to the first checkpoint. Each later interval is twice the previous one.
@@ -28,89 +29,65 @@ const LONGEST_INTERVAL: Duration = Duration::from_secs(60);
 const WRITES_PER_INTERVAL: u32 = 50;
 
 /// Renders all shards of a plan, or the one of `--shard`.
-pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
-    let plan = Plan::read(plan_path)?;
-    let numbers = match args.shard {
-        Some(number) => {
-            check_shard(args, &plan, plan_path, number)?;
-            vec![number]
-        }
-        None => (BASE..=plan.settings.shards).collect(),
-    };
+pub fn run(args: &RenderArgs, plan: &Path) -> Result<(), Failure> {
+    let job = Job::at(plan)?;
+    if let Some(shard) = args.shard {
+        check_shard(args, &job, shard)?;
+    }
     let output = FilmOutput::new(&args.output, args.bits, args.clobber.existing())?;
     let document = read_scene(&args.scene)?;
-    let found = scene_hash(document.text(), document.scene());
-    if found != plan.settings.scene_hash {
-        return Err(Failure::Failed(format!(
-            "{} is not the scene of {}: its hash is {found}, that of the plan {}; name the \
-             unchanged scene, or plan again",
-            args.scene.display(),
-            plan_path.display(),
-            plan.settings.scene_hash
-        )));
-    }
-    let complete = numbers.iter().map(|number| PartShard { number: *number, complete: true });
-    let mut part = Part { plan: Arc::new(plan), shards: complete.collect(), rays: 0 };
+    check_scene(&document, &args.scene, &job)?;
     let mut claim = save::claim(&args.output)?;
-    let saved = match args.shard {
-        Some(_) => saved(&args.output, &part)?,
-        None => None,
-    };
-    if let Some(SavedShard { is_complete: true, rays, .. }) = saved {
-        return print_line(&format!("{}  complete already  {rays} rays", args.output.display()));
-    }
     let signals = handle_signals()?;
-    let mut render = start(args, &document, &part, saved)?;
-    let mut write = |render: &ShardRender, complete| {
-        part.shards.iter_mut().for_each(|shard| shard.complete = complete);
-        part.rays = render.rays;
-        claim.check()?;
-        let written = part_file::write(&output, &render.state, &part)?;
-        claim.keep(written.file);
-        Ok(written.report)
+    let state = compile(&document, &args.scene, &job, args.acceleration)?;
+    let Some(number) = args.shard else {
+        return whole(args, &job, &output, state, &signals);
     };
-    let mut checkpoint = |render: &ShardRender| match output {
-        FilmOutput::Film(..) => write(render, false).map(drop),
-        FilmOutput::Picture(..) => Ok(()),
-    };
-    let signal = trace(&mut render, &signals, &mut checkpoint);
-    let unfinished = signal.is_some() && render.progress() < 1.0;
-    let report = save::persist(|| write(&render, !unfinished))?;
-    let share = match unfinished {
-        true => {
-            format!("  {:.0} % of the samples (stopped by a signal)", 100.0 * render.progress())
-        }
-        false => String::new(),
-    };
-    print_line(&format!(
-        "{}  {}  {} rays{share}",
-        args.output.display(),
-        part_file::summary(&report),
-        render.rays,
-    ))?;
-    match signal {
-        Some(status) if unfinished => Err(Failure::Signalled(status)),
-        _ => Ok(()),
+    let mut tracer =
+        ShardTracer { state: Some(state), threads: args.compute.threads(), signals: &signals };
+    match tracer.trace(&job, number, &mut claim)? {
+        Traced::Done => Ok(()),
+        Traced::Taken => Err(Failure::Failed(format!(
+            "cannot write {}: another process is writing it",
+            args.output.display()
+        ))),
+        Traced::Stopped(status) => Err(Failure::Signalled(status)),
     }
 }
 
+/// Traces all samples of the plan of `job` in this process.
+fn whole(
+    args: &RenderArgs,
+    job: &Job,
+    output: &FilmOutput,
+    state: RenderState,
+    signals: &Signals,
+) -> Result<(), Failure> {
+    let threads = args.compute.threads();
+    let mut render = ShardRender::new(state, &job.plan, job.plan.whole(), threads)?;
+    let signal = trace(&mut render, signals, &mut |_| Ok(()));
+    let unfinished = signal.is_some() && render.progress() < 1.0;
+    let shard = |number: u32| {
+        // All samples count as those of the first shard.
+        let samples = if number == 1 { render.samples() } else { [0; 2] };
+        PartShard { number, complete: !unfinished, samples }
+    };
+    let shards = (1..=job.head.settings.shards).map(shard).collect();
+    let part = Part { plan: Arc::clone(&job.head), shards, rays: render.rays() };
+    let written = save::persist(|| part_file::write(output, &render, &part))?;
+    let rays = job.head.settings.base_rays + render.rays();
+    let share = stopped(&render, unfinished);
+    let path = args.output.display();
+    print_line(&format!("{path}  {}  {rays} rays{share}", part_file::summary(&written.report)))?;
+    signal.filter(|_| unfinished).map_or(Ok(()), |status| Err(Failure::Signalled(status)))
+}
+
 /// Checks that the plan has `shard` to trace, and that the output is a film file.
-fn check_shard(args: &RenderArgs, plan: &Plan, path: &Path, shard: u32) -> Result<(), Failure> {
-    let last = plan.settings.shards;
-    if shard > last {
-        return Err(Failure::Usage(format!(
-            "--shard {shard}: {} has the shards 1 to {last}, and 0 for the base",
-            path.display()
-        )));
-    }
-    if shard == BASE
-        && let Some(merged) = plan.settings.base_plan
-    {
-        return Err(Failure::Usage(format!(
-            "--shard 0: the base of {} is the merged film of the plan {merged:016x}, which no \
-             shard traces",
-            path.display()
-        )));
+fn check_shard(args: &RenderArgs, job: &Job, shard: u32) -> Result<(), Failure> {
+    let last = job.head.settings.shards;
+    if !(1..=last).contains(&shard) {
+        let plan = job.path.display();
+        return Err(Failure::Usage(format!("--shard {shard}: {plan} has the shards 1 to {last}")));
     }
     if !part_file::is_film(&args.output) {
         return Err(Failure::Usage(format!(
@@ -122,18 +99,135 @@ fn check_shard(args: &RenderArgs, plan: &Plan, path: &Path, shard: u32) -> Resul
     Ok(())
 }
 
-/// Film of an earlier run of a shard.
-struct SavedShard {
-    film: Film,
-    rays: u64,
-    is_complete: bool,
+/// Checks that `document`, the scene at `path`, is that of the plan of `job`.
+pub fn check_scene(document: &Document, path: &Path, job: &Job) -> Result<(), Failure> {
+    let (found, planned) =
+        (scene_hash(document.text(), document.scene()), &job.head.settings.scene_hash);
+    if found == *planned {
+        return Ok(());
+    }
+    Err(Failure::Failed(format!(
+        "{} is not the scene of {}: its hash is {found}, that of the plan {planned}; name the \
+         unchanged scene, or plan again",
+        path.display(),
+        job.path.display(),
+    )))
 }
 
-/// Reads the film file of an earlier run of the same shard. Returns `None` if the file does not
-/// exist or is damaged.
-fn saved(path: &Path, part: &Part) -> Result<Option<SavedShard>, Failure> {
+/// Compiles the scene of `job`, without memory for a film.
+pub fn compile(
+    document: &Document,
+    path: &Path,
+    job: &Job,
+    acceleration: Option<Acceleration>,
+) -> Result<RenderState, Failure> {
+    let settings = &job.head.settings;
+    let mut scene = document.scene().clone();
+    scene.film.size = settings.size;
+    scene.trace.acceleration = acceleration.unwrap_or(scene.trace.acceleration);
+    let sampling = SampleSettings { seed: settings.seed, kind: settings.sampler };
+    let options = Options::new(settings.precision, sampling, settings.display);
+    RenderState::without_film(&Arc::new(scene), &options)
+        .map_err(|fault| Failure::Failed(format!("{}: {fault}", path.display())))
+}
+
+/// Tracer of shards, one after the other.
+pub struct ShardTracer<'a> {
+    /// Compiled scene; `None` after a failure.
+    pub state: Option<RenderState>,
+    pub threads: usize,
+    pub signals: &'a Signals,
+}
+
+/// End of the work on a shard.
+pub enum Traced {
+    Done,
+    /// Another process has begun the shard at the same moment.
+    Taken,
+    /// A signal with this exit status has stopped it.
+    Stopped(u8),
+}
+
+impl ShardTracer<'_> {
+    /// Traces a shard of `job` into the claimed file, or continues it.
+    pub fn trace(&mut self, job: &Job, number: u32, claim: &mut Claim) -> Result<Traced, Failure> {
+        let path = claim.path().to_path_buf();
+        let saved = match saved(&path, &job.head, number)? {
+            Saved::Complete(rays) => {
+                print_line(&format!("{}  complete already  {rays} rays", path.display()))?;
+                return Ok(Traced::Done);
+            }
+            Saved::Unfinished(reader) => Some(reader),
+            Saved::Nothing => None,
+        };
+        let share = job.plan.share(number);
+        let state = self.state.take().ok_or("no compiled scene")?;
+        let mut render = ShardRender::new(state, &job.plan, share.clone(), self.threads)?;
+        let mut existing = if path.exists() { Existing::Replace } else { Existing::Refuse };
+        let mut write = |render: &ShardRender, complete| {
+            let shards = vec![PartShard { number, complete, samples: render.samples() }];
+            let part = Part { plan: Arc::clone(&job.head), shards, rays: render.rays() };
+            claim.check()?;
+            let output = FilmOutput::Film(path.clone(), existing);
+            claim.keep(part_file::write(&output, render, &part)?.file);
+            existing = Existing::Replace;
+            Ok::<_, WriteError>(())
+        };
+        if saved.is_none() && !path.exists() {
+            // The empty part shows other processes that the shard is taken.
+            match write(&render, false) {
+                Err(error) if is_taken(&error) => {
+                    self.state = Some(render.state);
+                    return Ok(Traced::Taken);
+                }
+                written => written?,
+            }
+        }
+        match saved.map(|reader| render.resume(*reader)) {
+            Some(Ok(())) => {}
+            Some(Err(error)) => {
+                warn(&format!("warning: {}: {error}; the shard starts again", path.display()));
+                render = ShardRender::new(render.state, &job.plan, share.clone(), self.threads)?;
+                render.take_base(job.base_of(&share).into_iter());
+            }
+            None => render.take_base(job.base_of(&share).into_iter()),
+        }
+        let signal = trace(&mut render, self.signals, &mut |render| write(render, false));
+        let unfinished = signal.is_some() && render.progress() < 1.0;
+        save::persist(|| write(&render, !unfinished))?;
+        print_line(&format!(
+            "{}  {} tiles  {} rays  {:.1} s{}",
+            path.display(),
+            share.ranges.len(),
+            render.rays(),
+            render.report().seconds,
+            stopped(&render, unfinished)
+        ))?;
+        self.state = Some(render.state);
+        Ok(signal.filter(|_| unfinished).map_or(Traced::Done, Traced::Stopped))
+    }
+}
+
+/// Formats the progress of a shard that a signal has stopped.
+fn stopped(render: &ShardRender, unfinished: bool) -> String {
+    let share = 100.0 * render.progress();
+    let text = format!("  {share:.0} % of the samples (stopped by a signal)");
+    if unfinished { text } else { String::new() }
+}
+
+/// File of an earlier run of a shard.
+enum Saved {
+    /// There is no such file, or it is damaged or without samples.
+    Nothing,
+    Unfinished(Box<FilmReader<BufReader<File>>>),
+    /// Complete part with this number of rays.
+    Complete(u64),
+}
+
+/// Opens the film file of an earlier run of the shard `number` of `plan`.
+fn saved(path: &Path, plan: &PlanHead, number: u32) -> Result<Saved, Failure> {
     if !path.exists() {
-        return Ok(None);
+        return Ok(Saved::Nothing);
     }
     let failed = |reason: &str| {
         Failure::Failed(format!(
@@ -141,58 +235,46 @@ fn saved(path: &Path, part: &Part) -> Result<Option<SavedShard>, Failure> {
             path.display()
         ))
     };
-    let report = |error: &FileError| warn(&format!("warning: {error}; the shard starts again"));
-    let Ok(reader) = FilmReader::open(path).inspect_err(report) else { return Ok(None) };
+    let damaged = |error: FileError| {
+        warn(&format!("warning: {error}; the shard starts again"));
+        Ok(Saved::Nothing)
+    };
+    let reader = match FilmReader::open(path) {
+        Ok(reader) => reader,
+        Err(error) => return damaged(error),
+    };
     let found = Part::of_header(path, &reader.header)?;
     let found = found.ok_or_else(|| failed("is a film without plan"))?;
-    if found.plan != part.plan {
+    if found.plan.checksum != plan.checksum {
         return Err(failed("belongs to another plan"));
     }
     let [shard] = found.shards[..] else { return Err(failed("holds several shards")) };
-    if shard.number != part.shards[0].number {
+    if shard.number != number {
         return Err(failed(&format!("holds shard {}", shard.number)));
     }
-    let film = reader.read().inspect_err(report).ok().map(|saved| saved.film);
-    Ok(film.map(|film| SavedShard { film, rays: found.rays, is_complete: shard.complete }))
-}
-
-/// Creates the render of the shards of `part`, which continues `saved`.
-fn start(
-    args: &RenderArgs,
-    document: &Document,
-    part: &Part,
-    saved: Option<SavedShard>,
-) -> Result<ShardRender, Failure> {
-    let plan = &part.plan;
-    let settings = &plan.settings;
-    let mut scene = document.scene().clone();
-    scene.film.size = settings.size;
-    if let Some(acceleration) = args.acceleration {
-        scene.trace.acceleration = acceleration;
-    }
-    let sampling = SampleSettings { seed: settings.seed, kind: settings.sampler };
-    let options = Options::new(settings.precision, sampling, settings.display);
-    let mut state = RenderState::new(&Arc::new(scene), &options, None)
-        .map_err(|fault| format!("{}: {fault}", args.scene.display()))?;
-    let mut rays = 0;
-    if let Some(saved) = saved {
-        if saved.film.header != state.film.header {
-            return Err(Failure::Failed(format!(
-                "{} is the film of another scene; remove it or name another file",
-                args.output.display()
-            )));
+    match shard.samples {
+        _ if shard.complete => {
+            reader.verify().map(|_| Saved::Complete(found.rays)).or_else(damaged)
         }
-        (state.film, rays) = (saved.film, saved.rays);
+        [0, _] => Ok(Saved::Nothing),
+        _ => Ok(Saved::Unfinished(Box::new(reader))),
     }
-    let ranges = match part.shards[..] {
-        [one] => plan.ranges(one.number),
-        _ => plan.tiles.iter().map(|tile| 0..tile.end).collect(),
-    };
-    let threads = args.compute.threads();
-    Ok(ShardRender::new(state, &ranges, rays, threads)?)
 }
 
-/// Traces samples until the shards are complete or a signal arrives. Returns the exit status of the
+/// Returns `true` if the part at `path` is complete and belongs to `plan`.
+pub fn is_complete(path: &Path, plan: &PlanHead) -> bool {
+    let part = FilmReader::open(path)
+        .ok()
+        .and_then(|reader| Part::of_header(path, &reader.header).ok().flatten());
+    part.is_some_and(|part| part.is_complete() && part.plan.checksum == plan.checksum)
+}
+
+/// Returns `true` if `error` says that another process writes the file.
+pub fn is_taken(error: &WriteError) -> bool {
+    [ErrorKind::WouldBlock, ErrorKind::AlreadyExists].contains(&error.kind)
+}
+
+/// Traces samples until the shard is complete or a signal arrives. Returns the exit status of the
 /// signal, or `None` without a signal. Calls `write_checkpoint` at intervals.
 fn trace(
     render: &mut ShardRender,

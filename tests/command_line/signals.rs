@@ -1,6 +1,7 @@
 //! Reactions of commands to signals, which tests send by `kill`.
 
 use super::*;
+use crate::command_line::shards::set_samples;
 use crate::harness::*;
 use std::io::{BufRead, BufReader};
 use std::process::Child;
@@ -131,8 +132,8 @@ fn limit_of_file_sizes_is_an_error() {
 fn failed_last_writes_are_repeated() {
     let desk = Desk::new();
     let plan = ["plan", "scene.toml", "-o", "job.plan", "--size", "64x48", "--shards", "1"];
-    let run = desk.run(&[&plan[..], &["--noise", "0.0005", "--pilot", "1"]].concat());
-    assert_eq!(run.status, 0, "{}", run.err);
+    assert_eq!(desk.run(&plan).status, 0);
+    set_samples(&desk, 100_000_000);
     let render = "render scene.toml -o out/a.png --noise 1e-6 --time 60 --checkpoint out/a.zk";
     let shard = "render scene.toml --plan job.plan --shard 1 -o out/a.zk";
     for (args, files) in [(render, &["a.png", "a.zk"][..]), (shard, &["a.zk"])] {
@@ -189,20 +190,20 @@ fn second_render_on_a_checkpoint_waits_for_the_first() {
 fn signal_keeps_the_samples_of_a_shard_which_continues() {
     let desk = Desk::new();
     let plan = ["plan", "scene.toml", "-o", "job.plan", "--size", "64x48", "--shards", "1"];
-    let run = desk.run(&[&plan[..], &["--noise", "0.02", "--pilot", "1"]].concat());
-    assert_eq!(run.status, 0, "{}", run.err);
+    assert_eq!(desk.run(&plan).status, 0);
+    set_samples(&desk, 3000);
     let shard = ["render", "scene.toml", "--plan", "job.plan", "--shard", "1", "-o"];
     let child = spawn(&desk, &[&shard[..], &["job-1.zk"]].concat());
     signal("TERM", child.id());
     let run = Run::from(child.wait_with_output().unwrap());
     assert_eq!(run.status, 143, "{}", run.err);
     assert!(run.out.contains("% of the samples (stopped by a signal)"), "{}", run.out);
-    let merge = |more: &[&str]| desk.run(&[&["merge", "job-0.zk", "job-1.zk"], more].concat());
+    let merge = |more: &[&str]| desk.run(&[&["merge", "job-1.zk"], more].concat());
     let run = merge(&["-o", "a.png"]);
     assert!(run.status == 1, "{}", run.out);
     assert!(run.err.contains("job-1.zk is an unfinished checkpoint of shard 1"), "{}", run.err);
     let run = merge(&["-o", "a.png", "--partial"]);
-    assert!(run.out.contains("missing of 1 shards: 1; noise 0."), "{} {}", run.out, run.err);
+    assert!(run.out.contains("missing of 1 shards: 1; "), "{} {}", run.out, run.err);
     for output in ["job-1.zk", "uninterrupted.zk"] {
         let run = desk.run(&[&shard[..], &[output]].concat());
         assert_eq!(run.status, 0, "{}", run.err);

@@ -69,7 +69,7 @@ const STORIES: &[Story] = &[
     ("zerkalo check --json bad.toml", 1, "\"line\": 15", "bad.toml:15:"),
     ("zerkalo info --json q.png", 0, "\"noise_levels\": ", ""),
     ("zerkalo doctor --json", 0, "\"hints\": [", ""),
-    ("zerkalo plan scene.toml $P --json -o j.plan", 0, "\"largest_shard_rays\": ", ""),
+    ("zerkalo plan scene.toml $P --json -o j.plan", 0, "\"total_rays\": ", ""),
     ("zerkalo plan scene.toml $P -n -o j.plan", 1, "", "there is such a file already"),
     ("zerkalo render -q scene.toml --plan j.plan --shard 1 -o j-1.zk", 0, "", ""),
     ("zerkalo merge j.plan -o j.png --json", 0, "\"missing\": null", ""),
@@ -82,7 +82,7 @@ const STORIES: &[Story] = &[
     ("zerkalo compare a.png scene.toml", 1, "", "it is no PNG, OpenEXR or film file"),
     ("zerkalo compare a.png j-1.zk", 1, "", "it is a film; expected a PNG or OpenEXR picture"),
     // Mistyped names, errors in scenes.
-    ("zerkalo rendr scene.toml", 2, "", "did you mean `render`?\nCommands: render, plan, merge"),
+    ("zerkalo rendr scene.toml", 2, "", "did you mean `render`?\nCommands: render, plan, work"),
     ("zerkalo rendr", 2, "", "did you mean `render`?"),
     ("zerkalo check scen.toml", 1, "", "Did you mean scene.toml?"),
     (

@@ -48,15 +48,11 @@ fn parts_are_added_as_they_appear() {
     let desk = Desk::new();
     plan(&desk, "job", 3);
     let mut films = open(&desk, &["job.plan"]).unwrap();
-    let expected = [
-        ("1", WatchedState::Missing),
-        ("2", WatchedState::Missing),
-        ("3", WatchedState::Missing),
-        ("0", WatchedState::Complete),
-    ];
+    let expected =
+        [("1", WatchedState::Missing), ("2", WatchedState::Missing), ("3", WatchedState::Missing)];
     assert_eq!(states(&films), expected.map(|(shards, state)| (shards.to_string(), state)));
-    assert!(sum(&films).bytes() == film(&desk, "job-0.zk").bytes());
-    assert_eq!(films.complete_shards(), Some([1, 4]));
+    assert!(films.sum.is_none());
+    assert_eq!(films.complete_shards(), Some([0, 3]));
     assert!(!films.poll(), "nothing has changed");
     for shard in [2, 3, 1] {
         trace(&desk, "job", shard);
@@ -65,7 +61,7 @@ fn parts_are_added_as_they_appear() {
         assert_eq!(row.state, WatchedState::Complete);
         assert!(row.samples > 0 && row.total == Some(row.samples), "{row:?}");
     }
-    let parts = ["job-0.zk", "job-1.zk", "job-2.zk", "job-3.zk"].map(str::to_string);
+    let parts = ["job-1.zk", "job-2.zk", "job-3.zk"].map(str::to_string);
     merge(&desk, &parts, "merged.zk");
     assert!(sum(&films).bytes() == film(&desk, "merged.zk").bytes());
     let merged = FilmReader::open(&desk.path("merged.zk")).unwrap();
@@ -73,14 +69,14 @@ fn parts_are_added_as_they_appear() {
         header.metadata.iter().find(|(key, _)| key == "Shards").cloned()
     };
     assert_eq!(entry(&films.sum.as_ref().unwrap().header), entry(&merged.header));
-    assert!(entry(&merged.header).unwrap().1.starts_with("0-3 of 3, plan "));
+    assert!(entry(&merged.header).unwrap().1.starts_with("1-3 of 3, plan "));
     // The samples of a file that is removed no longer count. The names on the command line may have
     // any order.
     fs::remove_file(desk.path("job-2.zk")).unwrap();
     assert!(films.poll());
-    let three = open(&desk, &["job-3.zk", "job-0.zk", "job-1.zk"]).unwrap();
-    assert!(sum(&films).bytes() == sum(&three).bytes());
-    assert_eq!(states(&three)[0], ("2".to_string(), WatchedState::Missing));
+    let two = open(&desk, &["job-3.zk", "job-1.zk"]).unwrap();
+    assert!(sum(&films).bytes() == sum(&two).bytes());
+    assert_eq!(states(&two)[0], ("2".to_string(), WatchedState::Missing));
     assert_eq!(states(&films)[0], ("2".to_string(), WatchedState::Missing));
 }
 
@@ -114,7 +110,7 @@ fn unfinished_shards_are_running_and_then_late() {
     // negative.
     let early = films.shards(SystemTime::UNIX_EPOCH);
     assert!(early.iter().all(|row| row.age.is_none_or(|age| age.is_zero())));
-    assert!(sum(&films).bytes() == film(&desk, "job-0.zk").bytes());
+    assert_eq!(sum(&films).samples(), 0);
     // A film file of a shard is not used if it is marked complete but has no samples.
     header.chunks.insert(*b"PART", text.into_bytes());
     let file = EncodedFilm::new(&header, &empty, None).pieces.concat();
@@ -130,14 +126,14 @@ fn unfinished_shards_are_running_and_then_late() {
 fn files_that_do_not_belong_together_are_refused_by_name() {
     let desk = Desk::new();
     let parts = traced(&desk, "job", 2);
-    plan(&desk, "other", 3);
+    traced(&desk, "other", 3);
     let run = desk.render("a.png", &["--spp", "2", "--checkpoint", "a.zk"]);
     assert_eq!(run.status, 0, "{}", run.err);
     fs::copy(desk.path("job-1.zk"), desk.path("copy.zk")).unwrap();
     fs::copy(desk.path("a.zk"), desk.path("b.zk")).unwrap();
     for (names, expected) in [
         (["job-1.zk", "copy.zk"], "both hold shard 1; name one of them"),
-        (["job-1.zk", "other-0.zk"], "belong to different plans (`shards 2` and `shards 3`)"),
+        (["job-1.zk", "other-1.zk"], "belong to different plans (`shards 2` and `shards 3`)"),
         (["job-1.zk", "a.zk"], "a.zk to other films: it belongs to no plan"),
         (["a.zk", "b.zk"], "a.zk to other films: it belongs to no plan"),
         (["job.plan", "other.plan"], "are two plans; name one of them"),
@@ -159,7 +155,7 @@ fn files_that_do_not_belong_together_are_refused_by_name() {
     let whole = sum(&films).bytes();
     let own = fs::read(desk.path("job-1.zk")).unwrap();
     for (foreign, expected) in [
-        ("other-0.zk", "belong to different plans"),
+        ("other-1.zk", "belong to different plans"),
         ("job-2.zk", "both hold shard 2"),
         ("a.zk", "it belongs to no plan"),
         ("scene.toml", "it is not a film file"),
@@ -172,24 +168,29 @@ fn files_that_do_not_belong_together_are_refused_by_name() {
     replace(&desk, "job-1.zk", &own);
     assert!(films.poll());
     assert!(sum(&films).bytes() == whole && refusal(&films).is_empty());
-    assert_eq!(parts.len(), 3);
+    assert_eq!(parts.len(), 2);
 }
 
+/// Checks that a watched job goes on to its next round, whose missing tiles are those of the round
+/// before.
 #[test]
-fn next_round_is_watched_with_the_merged_film_of_the_first() {
+fn next_round_is_watched_over_the_round_before() {
     let desk = Desk::new();
-    let parts = traced(&desk, "job", 2);
-    merge(&desk, &parts, "merged.zk");
-    let args =
-        ["plan", "--from", "merged.zk", "-o", "next.plan", "--noise", "0.2", "--shards", "2"];
-    done(&desk, &args);
-    trace(&desk, "next", 1);
-    let films = open(&desk, &["next.plan", "merged.zk"]).unwrap();
-    assert_eq!(films.complete_shards(), Some([2, 3]));
-    assert_eq!(states(&films)[0], ("2".to_string(), WatchedState::Missing));
-    // Without the base the picture has the samples of the shard only.
-    let alone = open(&desk, &["next.plan"]).unwrap();
-    assert!(sum(&alone).bytes() == film(&desk, "next-1.zk").bytes());
+    traced(&desk, "job", 2);
+    let mut films = open(&desk, &["job.plan"]).unwrap();
+    let first = sum(&films).bytes();
+    done(&desk, &["plan", "--from", "job.plan", "--noise", "0.5"]);
+    assert!(films.poll());
+    assert_eq!((films.complete_shards(), states(&films).len()), (Some([0, 2]), 2));
+    assert!(sum(&films).bytes() == first);
+    trace(&desk, "job.2", 2);
+    assert!(films.poll());
+    let [part, both] = [film(&desk, "job.2-2.zk"), film(&desk, "job-1.zk")];
+    let held = |film: &Film, tile| film.counts(tile) != [0; 2];
+    for tile in (0..part.tile_count()).filter(|tile| held(&part, *tile) || held(&both, *tile)) {
+        let from = if held(&part, tile) { &part } else { &both };
+        assert_eq!(sum(&films).counts(tile), from.counts(tile), "tile {tile}");
+    }
 }
 
 #[test]

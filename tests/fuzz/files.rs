@@ -4,6 +4,7 @@
 use crate::harness::*;
 use png::{BitDepth, ColorType};
 use zerkalo_render::plan::PlannedTile;
+use zerkalo_render::schedule::RoundEstimate;
 use zerkalo_scene::value::fnv1a64;
 
 /// Returns a triangle mesh of a sphere: its vertices, and the vertex indices of each triangle.
@@ -253,14 +254,15 @@ pub fn toml() -> Vec<Vec<u8>> {
     texts.collect()
 }
 
-/// Returns two plan files (a plan divides a render among several processes). The first plan was
-/// made from a trial render, and the second one refines an earlier plan.
+/// Returns two plan files (a plan divides a render among several processes). The second one names
+/// an earlier plan.
 pub fn plan() -> Vec<Vec<u8>> {
     let tile = |(base, end, glossy): (u32, u32, bool)| PlannedTile {
         base,
         end,
         rays_per_sample: 2.75,
         glossy,
+        earlier: [RoundEstimate { samples: base, allocation: 2.0, reported: 0.5 }; 2],
     };
     let plan = |base_plan: Option<u64>, shards: u32| Plan {
         settings: PlanSettings {
@@ -274,7 +276,10 @@ pub fn plan() -> Vec<Vec<u8>> {
             rays_per_pixel: 0,
             noise_levels: 0.25,
             shards,
+            round: 2,
             base_plan,
+            base_rays: 5,
+            total_rays: 8.5,
         },
         predicted_levels: 0.25,
         slopes: [0.7, 0.5],

@@ -208,8 +208,8 @@ fn plan() {
         // Every sample of an accepted plan belongs to one shard (part of the render for one
         // process).
         let shards = plan.settings.shards.min(50);
-        let ranges = (0..=shards).map(|shard| plan.ranges(shard));
-        let samples: u64 = ranges.flatten().map(|range| range.len() as u64).sum();
+        let ranges = (1..=shards).flat_map(|shard| plan.share(shard).ranges);
+        let samples: u64 = ranges.map(|range| range.len() as u64).sum();
         let all: u64 = plan.tiles.iter().map(|tile| u64::from(tile.end)).sum();
         assert!(samples == all || shards < plan.settings.shards, "{samples} of {all}");
     }

@@ -2,13 +2,15 @@
 
 use super::*;
 
-/// Plans a render of `room.toml` in 160x120 pixels by three shards, as `job.plan`.
+/// Plans a render of `room.toml` in 160x120 pixels by four shards, as `job.plan`, and traces the
+/// last one.
 fn planned(fixture: &Fixture) {
     fixture.run(
-        &"plan room.toml --size 160x120 --noise 0.5 --pilot 3 --shards 3 -o job.plan"
+        &"plan room.toml --size 160x120 --noise 0.5 --shards 4 -o job.plan"
             .split(' ')
             .collect::<Vec<_>>(),
     );
+    trace(fixture, 4);
 }
 
 fn trace(fixture: &Fixture, shard: usize) {
@@ -48,7 +50,7 @@ fn picture_follows_the_files_of_other_processes() {
     assert_eq!(status, 0, "{bytes}");
     for picture in ["png", "exr"] {
         let expected = format!("expected.{picture}");
-        let parts = ["job-0.zk", "job-1.zk", "job-2.zk", "job-3.zk"];
+        let parts = ["job-1.zk", "job-2.zk", "job-3.zk", "job-4.zk"];
         fixture.run(&[&["merge", "-o", &expected], &parts[..]].concat());
         let expected = fs::read(fixture.path(&expected)).unwrap();
         let written = fs::read(fixture.path(&format!("room-1.{picture}"))).unwrap();
@@ -90,8 +92,8 @@ fn checkpoint_is_watched_while_its_render_runs() {
 fn foreign_files_are_refused_before_the_screen_changes() {
     let fixture = Fixture::with_room();
     planned(&fixture);
-    fs::copy(fixture.path("job-0.zk"), fixture.path("copy.zk")).unwrap();
-    let (status, bytes) = fixture.open(&["watch", "job-0.zk", "copy.zk"], [80, 24]).end();
+    fs::copy(fixture.path("job-4.zk"), fixture.path("copy.zk")).unwrap();
+    let (status, bytes) = fixture.open(&["watch", "job-4.zk", "copy.zk"], [80, 24]).end();
     assert_eq!(status, 1);
-    assert!(bytes.contains("both hold the base (shard 0); name one of them"), "{bytes:?}");
+    assert!(bytes.contains("both hold shard 4; name one of them"), "{bytes:?}");
 }

@@ -143,12 +143,12 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
             return self.trace_undivided(tile, site, pixels);
         }
         let (first, second) = pixels.split_at(middle);
-        let empty = tile.empty();
+        let extent = tile.extent;
         let (counts, taken) = rayon::join_context(
             |_| self.trace(tile, site, first),
             |context| {
                 context.migrated().then(|| {
-                    let mut own = empty.allocated();
+                    let mut own = Tile::blank(self.scales.len(), extent);
                     let counts = self.trace(&mut own, site, second);
                     (own, counts)
                 })

@@ -1,7 +1,7 @@
 //! State of one progressive render: compiled scene, film and noise estimator.
 
 use crate::error_probe::ErrorProbe;
-use crate::film::{Display, Estimator, Film, Header, LightWeights};
+use crate::film::{Display, Estimator, Film, Header, LightWeights, TILE};
 use crate::pass::PassContext;
 use crate::relighting::Relighting;
 use crate::schedule::{Measurable, Schedule, Settings};
@@ -59,6 +59,17 @@ impl RenderState {
         match scene.faults().first() {
             Some(fault) => Err(fault.to_string()),
             None => Self::compile(Arc::clone(scene), options, previous, 0..scene.film.size[1]),
+        }
+    }
+
+    /// Compiles `scene` like [`Self::new`], with a film of the first row of tiles only.
+    pub fn without_film(scene: &Arc<Scene>, options: &Options) -> Result<Self, String> {
+        match scene.faults().first() {
+            Some(fault) => Err(fault.to_string()),
+            None => {
+                let rows = 0..scene.film.size[1].min(TILE as u32);
+                Self::compile(Arc::clone(scene), options, None, rows)
+            }
         }
     }
 

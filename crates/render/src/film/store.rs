@@ -35,6 +35,18 @@ impl Header {
         scale.is_normal() && scale > 0.0 && scale.to_bits() << 12 == 0
     }
 
+    /// Returns the number of tiles.
+    pub(crate) fn tiles(&self) -> usize {
+        self.width.div_ceil(TILE) * self.height.div_ceil(TILE)
+    }
+
+    /// Returns width and height of the part of a tile that is inside the picture.
+    pub(crate) fn extent(&self, tile: usize) -> [usize; 2] {
+        let columns = self.width.div_ceil(TILE);
+        let [x, y] = [tile % columns * TILE, tile / columns * TILE];
+        [(self.width - x).min(TILE), (self.height - y).min(TILE)]
+    }
+
     /// Returns width and height in pixels.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height].map(|n| n as u32)
@@ -127,14 +139,9 @@ impl Film {
             );
         }
         let [columns, rows] = [width.div_ceil(TILE), height.div_ceil(TILE)];
-        let inside = |size: usize, i: usize| (size - i * TILE).min(TILE);
         let mut tiles = Vec::new();
         tiles.try_reserve_exact(columns * rows)?;
-        tiles.extend(
-            (0..columns * rows)
-                .map(|t| [inside(*width, t % columns), inside(*height, t / columns)])
-                .map(|extent| Tile::cleared(scales.len(), extent)),
-        );
+        tiles.extend((0..columns * rows).map(|t| Tile::cleared(scales.len(), header.extent(t))));
         Ok(Self { epoch: 1, tiles, header, first_row: 0 })
     }
 
@@ -264,6 +271,13 @@ impl Film {
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
+    /// Returns the estimated error of the tiles that have samples, as [`Self::noise`] does.
+    pub fn noise_of_sampled(&self, weights: &LightWeights, display: &Display) -> Option<Noise> {
+        let estimator = Estimator::new(&self.header.scales, weights, display);
+        let sampled = self.touched().filter(|(_, tile)| tile.counts != [0; 2]);
+        Noise::of_tiles(sampled.map(|(_, tile)| estimator.tile(tile)))
+    }
+
     /// Returns the number of samples that are NaN or negative.
     pub fn bad_samples(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.bad_samples).sum()
@@ -279,20 +293,19 @@ impl Film {
         self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }
 
-    /// Creates an empty tile for [`Film::add_at`].
-    pub(super) fn new_tile(&self, index: usize) -> Tile {
-        let mut tile = Tile::cleared(self.groups(), self.tiles[index].extent);
-        tile.clear_if_stale(self.epoch);
-        tile
+    /// Discards the samples of tile `index`.
+    pub(crate) fn clear_tile(&mut self, index: usize) {
+        self.tiles[index].epoch = 0;
     }
 
-    /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to tile `index`.
-    pub(super) fn add_at(&mut self, index: usize, tile: Tile) {
+    /// Adds the samples of `tile` to tile `index`, which has the same extent.
+    pub(crate) fn add_at(&mut self, index: usize, tile: Tile) {
         let ours = &mut self.tiles[index];
         if ours.epoch == self.epoch {
             ours.add_tile(&tile);
         } else {
             *ours = tile;
+            ours.epoch = self.epoch;
         }
     }
 

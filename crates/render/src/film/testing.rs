@@ -72,8 +72,8 @@ pub trait TestFilm {
     /// Returns the radiance of each pixel of the row `y`, as [`Self::pixel`] does.
     fn pixels_of_row(&self, y: usize, weights: &LightWeights) -> Vec<[f64; 3]>;
 
-    /// Adds the samples of another film, which hold another range of sample indices. Fails if the
-    /// headers differ.
+    /// Adds the samples of another film or band of a film, which hold another range of sample
+    /// indices. Fails if the headers differ.
     fn add(&mut self, other: &Film) -> Result<(), String>;
 
     /// Returns the film as bytes. Films with equal samples have equal bytes, in whatever order the
@@ -102,9 +102,14 @@ impl TestFilm for Film {
     }
 
     fn add(&mut self, other: &Film) -> Result<(), String> {
-        self.check_header(&other.header)?;
+        // A band is as wide as its picture.
+        let is_band = other.first_row + other.header.height < self.header.height;
+        let height =
+            if is_band || other.first_row > 0 { self.header.height } else { other.header.height };
+        self.check_header(&Header { height, ..other.header.clone() })?;
+        let first = other.first_row / TILE * other.tile_columns();
         for (index, theirs) in other.touched() {
-            self.slots(&[index]).remove(0).prepare().add_tile(theirs);
+            self.slots(&[first + index]).remove(0).prepare().add_tile(theirs);
         }
         Ok(())
     }

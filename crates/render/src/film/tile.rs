@@ -64,15 +64,11 @@ impl Tile {
         Self { stride: groups * 3, extent, ..Self::default() }
     }
 
-    /// Returns a tile without samples and without memory, at the same position as this one.
-    pub fn empty(&self) -> Self {
-        Self::cleared(self.stride / 3, self.extent)
-    }
-
-    /// Allocates the memory of a tile without samples.
-    pub fn allocated(mut self) -> Self {
-        self.clear_if_stale(1);
-        self
+    /// Creates a tile that belongs to no film.
+    pub(crate) fn blank(groups: usize, extent: [usize; 2]) -> Self {
+        let mut tile = Self::cleared(groups, extent);
+        tile.clear_if_stale(1);
+        tile
     }
 
     pub(super) fn sums_len(groups: usize) -> usize {
@@ -223,7 +219,7 @@ impl Tile {
 
     /// Adds the samples of `other`, a tile at the same position of another film. At most one of the
     /// two tiles may be in its first pass.
-    pub fn add_tile(&mut self, other: &Self) {
+    pub(crate) fn add_tile(&mut self, other: &Self) {
         for (replicate, pixel) in other.written() {
             self.add(replicate, pixel, other.pixel(replicate, pixel));
         }

@@ -1,61 +1,120 @@
-//! Division of a planned render's samples among its shards, which different processes trace.
+//! Division of a plan's tiles among its shards, which different processes trace.
 //!
-//! The samples of a tile after its base are cut at multiples of [`SAMPLE_ALIGNMENT`] into blocks.
-//! Shards get whole blocks, contiguous within a tile, for three reasons:
+//! The tiles are cut into runs of consecutive tiles, one a shard. A part therefore holds only its
+//! tiles, a process needs memory for them only, and the parts of a round together are one film.
 //!
-//! - An aligned block of 2^m indices of the Owen-scrambled Sobol sequence is as well distributed as
-//!   the first 2^m. The samples of every shard are therefore stratified (evenly distributed), and
-//!   so are those of a merged picture that lacks a shard. The full picture holds the sample indices
-//!   of each tile without gaps, starting at 0, wherever the cuts are.
-//! - A block is as long as the widest packet. Shards trace the same packets as one process, at the
-//!   same speed.
-//! - A shard traces the same indices in both replicates. In any sum of shards each tile therefore
-//!   has equally many samples of A and of B. The noise is estimated from the difference of A and B.
-//!
-//! If the number of blocks is not a multiple of the number of shards, the remaining blocks go to
-//! shards in turn, tile after tile. The total numbers of blocks of two shards differ by at most 1.
+//! - The lengths of the runs follow from the expected rays of their tiles. They fall linearly from
+//!   the first shard to the last, to a tenth: processes take shards in ascending order, and small
+//!   ones at the end let all processes finish at about the same time, slow ones included.
+//! - A tile with more rays than a shard should have is cut between blocks of [`SAMPLE_ALIGNMENT`]
+//!   samples. Such a block of the Owen-scrambled Sobol sequence is a net of its own and fills the
+//!   widest packets.
+//! - Both replicates are cut alike: in any sum of parts a tile has equally many samples of A and B,
+//!   from whose difference the noise is estimated.
 
-use crate::plan::{BASE, Plan, PlannedTile};
+use crate::plan::Plan;
 use crate::schedule::SAMPLE_ALIGNMENT;
 use std::ops::Range;
 
-impl PlannedTile {
-    /// Returns the number of blocks that the shards trace in this tile. The first and the last may
-    /// be shorter.
-    fn blocks(&self) -> u32 {
-        if self.end > self.base {
-            self.end.div_ceil(SAMPLE_ALIGNMENT) - self.base / SAMPLE_ALIGNMENT
-        } else {
-            0
-        }
-    }
+/// Share of the weight of the first shard by which that of the last one is smaller.
+const DECREASE: f64 = 0.9;
+/// Work of a tile without new samples, which is copied from the base, in samples per pixel.
+const COPY_SAMPLES: u32 = 1;
 
-    fn block_start(&self, block: u32) -> u32 {
-        let aligned = (self.base / SAMPLE_ALIGNMENT + block).saturating_mul(SAMPLE_ALIGNMENT);
-        aligned.clamp(self.base, self.end)
-    }
+/// Samples of one shard.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// Number of the first tile.
+    pub first: usize,
+    /// Range of sample indices in each tile from the first one on, in both replicates. Ranges that
+    /// begin at 0 contain the base of their tile.
+    pub ranges: Vec<Range<u32>>,
+}
+
+/// First sample of a shard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Cut {
+    tile: usize,
+    sample: u32,
 }
 
 impl Plan {
-    /// Returns the range of sample indices that `shard` traces in each tile, in row order, and in
-    /// both replicates. Ranges may be empty. The ranges of the shard [`BASE`] are the samples that
-    /// the plan started from. Panics if there is no such shard.
-    pub fn ranges(&self, shard: u32) -> Vec<Range<u32>> {
+    /// Returns all samples of the plan.
+    pub fn whole(&self) -> Share {
+        Share { first: 0, ranges: self.tiles.iter().map(|tile| 0..tile.end).collect() }
+    }
+
+    /// Returns the samples of `shard`, which may have none. Panics if there is no such shard.
+    pub fn share(&self, shard: u32) -> Share {
         let shards = self.settings.shards;
-        assert!(shard <= shards, "shard {shard} of {shards}");
-        if shard == BASE {
-            return self.tiles.iter().map(|tile| 0..tile.base).collect();
-        }
-        let mut turn = 0;
-        let range = |tile: &PlannedTile| {
-            let (whole, remaining) = (tile.blocks() / shards, tile.blocks() % shards);
-            // Position of the shard in the order in which the shards get the blocks of this tile.
-            let place = (shard - 1 + shards - turn) % shards;
-            turn = (turn + remaining) % shards;
-            let start = |place: u32| tile.block_start(place * whole + place.min(remaining));
-            start(place)..start(place + 1)
+        assert!((1..=shards).contains(&shard), "shard {shard} of {shards}");
+        let cuts = self.cuts();
+        let [start, end] = [cuts[shard as usize - 1], cuts[shard as usize]];
+        let tiles = start.tile..end.tile + usize::from(end.sample > 0);
+        let range = |tile: usize| {
+            let first = if tile == start.tile { start.sample } else { 0 };
+            let last = if tile == end.tile { end.sample } else { self.tiles[tile].end };
+            first..last
         };
-        self.tiles.iter().map(range).collect()
+        Share {
+            first: start.tile,
+            ranges: tiles.map(range).filter(|r| start < end || !r.is_empty()).collect(),
+        }
+    }
+
+    /// Returns the numbers of the shards that hold samples of the tiles `first..end`.
+    pub(super) fn shards_of(&self, tiles: Range<usize>) -> Range<u32> {
+        let cuts = self.cuts();
+        let before = cuts.partition_point(|cut| *cut <= Cut { tile: tiles.start, sample: 0 });
+        let end = cuts.partition_point(|cut| *cut < Cut { tile: tiles.end, sample: 0 });
+        before.max(1) as u32..(end as u32).clamp(1, self.settings.shards) + 1
+    }
+
+    /// Returns the first sample of each shard, and the end of the last one.
+    fn cuts(&self) -> Vec<Cut> {
+        let work = |tile: usize| {
+            let t = &self.tiles[tile];
+            let samples = (t.end - t.base + COPY_SAMPLES) as f64;
+            samples * self.pixels(tile) as f64 * f64::from(t.rays_per_sample.max(1.0))
+        };
+        let works: Vec<f64> = (0..self.tiles.len()).map(work).collect();
+        let total: f64 = works.iter().sum();
+        let shards = self.settings.shards;
+        // Share of the work before shard `n`.
+        let before = |n: u32| {
+            let x = f64::from(n) / f64::from(shards);
+            (x - 0.5 * DECREASE * x * x) / (1.0 - 0.5 * DECREASE)
+        };
+        let (mut tile, mut done) = (0, 0.0);
+        let mut cuts = vec![Cut { tile: 0, sample: 0 }];
+        for shard in 1..shards {
+            let target = total * before(shard);
+            while tile + 1 < works.len() && done + works[tile] <= target {
+                done += works[tile];
+                tile += 1;
+            }
+            let inside = ((target - done) / works[tile]).clamp(0.0, 1.0);
+            let share = total * (before(shard + 1) - before(shard));
+            let cut = self.cut(tile, inside, works[tile] <= 0.5 * share);
+            cuts.push(cut.max(cuts[cuts.len() - 1]));
+        }
+        cuts.push(Cut { tile: self.tiles.len(), sample: 0 });
+        cuts
+    }
+
+    /// Cuts `tile` after the share `inside` of its new samples, 0..=1, or beside it if it is `small`.
+    fn cut(&self, tile: usize, inside: f64, small: bool) -> Cut {
+        let t = &self.tiles[tile];
+        let sample = t.base + (inside * f64::from(t.end - t.base)) as u32;
+        let sample =
+            sample.saturating_add(SAMPLE_ALIGNMENT / 2) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT;
+        match small {
+            true if inside >= 0.5 => Cut { tile: tile + 1, sample: 0 },
+            true => Cut { tile, sample: 0 },
+            false if sample <= t.base => Cut { tile, sample: 0 },
+            false if sample >= t.end => Cut { tile: tile + 1, sample: 0 },
+            false => Cut { tile, sample },
+        }
     }
 }
 
@@ -67,48 +126,39 @@ mod tests {
 
     proptest! {
         #[test]
-        fn ranges_cover_every_sample_once_in_whole_blocks(
-            counts in proptest::collection::vec((0u32..70, 0u32..900), 12),
-            shards in 1u32..40,
+        fn shares_cover_every_sample_once(
+            counts in proptest::collection::vec((0u32..70, 0u32..900), 1..40),
+            shards in 1u32..60,
         ) {
             let tiles: Vec<[u32; 2]> =
                 counts.iter().map(|(base, more)| [*base, base + more]).collect();
             let plan = plan(shards, &tiles);
-            let ranges: Vec<_> = (0..=shards).map(|shard| plan.ranges(shard)).collect();
-            for (tile, [base, end]) in tiles.iter().enumerate() {
-                let mut sorted: Vec<_> = ranges.iter().map(|r| r[tile].clone()).collect();
-                sorted.retain(|range| !range.is_empty());
-                sorted.sort_by_key(|range| range.start);
-                let mut next = 0;
-                for range in sorted {
-                    prop_assert_eq!(range.start, next);
-                    let aligned = range.start % SAMPLE_ALIGNMENT == 0 || range.start == *base;
-                    prop_assert!(aligned, "{:?}", range);
-                    next = range.end;
+            let mut next = Cut { tile: 0, sample: 0 };
+            for shard in 1..=shards {
+                let Share { first, ranges } = plan.share(shard);
+                for (tile, range) in (first..).zip(ranges) {
+                    prop_assert_eq!(Cut { tile, sample: range.start }, next);
+                    let [base, end] = tiles[tile];
+                    let whole = range.end == end;
+                    prop_assert!(whole || range.end > base && range.end % SAMPLE_ALIGNMENT == 0);
+                    next = if whole { Cut { tile: tile + 1, sample: 0 } } else {
+                        Cut { tile, sample: range.end }
+                    };
+                    prop_assert!(plan.shards_of(tile..tile + 1).contains(&shard));
                 }
-                prop_assert_eq!(next, *end);
             }
-            let blocks = |shard: u32| -> u32 {
-                let of_range = |r: &Range<u32>| {
-                    if r.is_empty() { 0 } else { r.end.div_ceil(16) - r.start / 16 }
-                };
-                ranges[shard as usize].iter().map(of_range).sum()
-            };
-            let (least, most) = ((1..=shards).map(blocks).min(), (1..=shards).map(blocks).max());
-            prop_assert!(most.unwrap() - least.unwrap() <= 1);
+            prop_assert_eq!(next, Cut { tile: tiles.len(), sample: 0 });
         }
     }
 
     #[test]
-    fn shards_of_equal_tiles_have_equal_blocks() {
-        let plan = plan(4, &[[8, 40]; 12]);
-        // Each tile has the blocks 8..16, 16..32 and 32..40. The fourth shard gets no block of the
-        // first tile, and is therefore first in the second tile.
-        let ranges = |shard: u32| plan.ranges(shard)[..2].to_vec();
-        assert_eq!(ranges(0), [0..8, 0..8]);
-        assert_eq!(ranges(1), [8..16, 16..32]);
-        assert_eq!(ranges(2), [16..32, 32..40]);
-        assert_eq!(ranges(3), [32..40, 40..40]);
-        assert_eq!(ranges(4), [40..40, 8..16]);
+    fn shards_shrink_and_large_tiles_are_cut() {
+        let plan = |shards| plan(shards, &[[0, 16]; 90].map(|_| [0, 16]));
+        let lengths: Vec<_> = (1..=9).map(|shard| plan(9).share(shard).ranges.len()).collect();
+        assert_eq!(lengths, [17, 16, 13, 12, 10, 8, 7, 4, 3]);
+        let large = crate::plan::testing::plan(2, &[[8, 800], [8, 16]]);
+        let [one, two] = [1, 2].map(|shard| large.share(shard));
+        assert_eq!((one.first, one.ranges.len(), one.ranges[0].end), (0, 1, 576));
+        assert_eq!(two, Share { first: 0, ranges: vec![576..800, 0..16] });
     }
 }

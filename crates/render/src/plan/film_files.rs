@@ -2,16 +2,20 @@
 //! After a change of a file, all films are added again, which takes the memory of one film only.
 
 use crate::checkpoint::seconds_of;
-use crate::film::file::{FilmReader, SavedFilm};
-use crate::plan::merge::{SourcePart, join, without_plan};
-use crate::plan::part::{Part, PartShard, ranges};
-use crate::plan::{BASE, Plan, is_plan_file};
+use crate::film::file::{FilmFileHeader, FilmReader, SavedFilm};
+use crate::film::{Film, Tile};
+use crate::plan::merge::{join, without_plan};
+use crate::plan::part::{Part, PartShard, PlanHead, ranges};
+use crate::plan::{Job, is_plan_file};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 use zerkalo_scene::disk::FileStamp;
 use zerkalo_scene::value::{sort_by_number, total_order};
 
+/// Largest number of files that are decoded at once.
+const MOST_AT_ONCE: usize = 16;
 /// Age from which on an unfinished file counts as late. `zerkalo render` replaces its files every
 /// minute.
 const LATE: Duration = Duration::from_secs(180);
@@ -20,20 +24,14 @@ const LATE: Duration = Duration::from_secs(180);
 #[derive(Debug, Default)]
 pub struct FilmFiles {
     files: Vec<FilmFile>,
-    named: Option<NamedPlan>,
+    /// Job whose plan was named, in its latest round.
+    pub(super) named: Option<Job>,
     /// Plan that all files share. `None` before the first file, and for a checkpoint without a
     /// plan.
-    pub plan: Option<Arc<Plan>>,
+    pub plan: Option<Arc<PlanHead>>,
     /// Sum of the films, with a header that has the plan and all shards. `None` if no file can be
     /// read.
     pub sum: Option<SavedFilm>,
-}
-
-#[derive(Debug)]
-struct NamedPlan {
-    path: PathBuf,
-    /// Plan as a part without shards, so that it can be joined with the parts of the files.
-    part: Part,
 }
 
 /// Film file that another process may replace at any time.
@@ -92,17 +90,26 @@ pub struct WatchedShards {
 
 impl FilmFiles {
     /// Reads the film files at `paths`, which may be missing. A plan file stands for the film files
-    /// of its shards: `job.plan` for `job-0.zk`, `job-1.zk` and so on. Fails if a plan file cannot
-    /// be used, or if the films of two files cannot be added.
+    /// of the latest round of its job: `job.plan` for `job-1.zk`, `job-2.zk` and so on. Fails if a
+    /// plan file cannot be used, or if the films of two files cannot be added.
     pub fn open(paths: &[PathBuf]) -> Result<Self, String> {
+        match Self::of_headers(paths)? {
+            (_, Some(reason)) => Err(reason),
+            (mut films, None) => {
+                films.add();
+                Ok(films)
+            }
+        }
+    }
+
+    /// Reads the headers of the film files at `paths`, as [`Self::open`] does. Also returns the
+    /// reason for which it refuses the first file whose film cannot be added, if any.
+    pub fn of_headers(paths: &[PathBuf]) -> Result<(Self, Option<String>), String> {
         let mut films = Self::default();
         films.name(paths)?;
         let changed = films.read_changed();
-        if let Some(reason) = films.accept(&changed) {
-            return Err(reason);
-        }
-        films.add();
-        Ok(films)
+        let reason = films.accept(&changed);
+        Ok((films, reason))
     }
 
     /// Reads the headers of the parts at `paths`. A plan file stands for the film files of its
@@ -121,6 +128,11 @@ impl FilmFiles {
         films.try_join().map(|()| films)
     }
 
+    /// Returns the job whose plan was named.
+    pub fn job(&self) -> Option<&Job> {
+        self.named.as_ref()
+    }
+
     /// Adds the files at `paths`, and those of the plan among them.
     fn name(&mut self, paths: &[PathBuf]) -> Result<(), String> {
         for path in paths {
@@ -135,36 +147,44 @@ impl FilmFiles {
 
     /// Adds the film files of the plan at `path`. Fails if another plan was named before.
     fn name_plan(&mut self, path: &Path) -> Result<(), String> {
-        let plan = Plan::read(path).map_err(|error| error.to_string())?;
-        // If the plan continues an earlier plan, its base is the merged film of the earlier plan,
-        // in a file whose name is unknown here.
-        let first = if plan.settings.base_plan.is_some() { BASE + 1 } else { BASE };
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        self.files.extend((first..=plan.settings.shards).map(|shard| {
-            FilmFile::new(path.with_file_name(format!("{stem}-{shard}.zk")), Some(shard))
-        }));
-        let part = Part { plan: Arc::new(plan), shards: Vec::new(), rays: 0 };
-        match self.named.replace(NamedPlan { path: path.to_path_buf(), part }) {
-            None => Ok(()),
-            Some(other) => {
-                let [one, two] = [other.path.display(), path.display()];
-                Err(format!("{one} and {two} are two plans; name one of them"))
-            }
+        if let Some(other) = &self.named {
+            let [one, two] = [other.path.display(), path.display()];
+            return Err(format!("{one} and {two} are two plans; name one of them"));
         }
+        let job = Job::open(path).map_err(|error| error.to_string())?;
+        self.named = Some(job);
+        self.name_parts();
+        Ok(())
     }
 
-    /// Reads the files that were replaced since the last call. Returns `true` if any were replaced.
+    /// Replaces the film files of the named plan by those of its latest round.
+    fn name_parts(&mut self) {
+        let Some(job) = &self.named else { return };
+        self.files.retain(|file| file.shard.is_none());
+        let shards = 1..=job.head.settings.shards;
+        self.files.extend(shards.map(|shard| FilmFile::new(job.part_path(shard), Some(shard))));
+    }
+
+    /// Reads the files that were replaced since the last call, and goes on to the latest round.
+    /// Returns `true` if any were replaced.
     pub fn poll(&mut self) -> bool {
+        let advanced = self.named.as_mut().is_some_and(Job::advance);
+        if advanced {
+            self.name_parts();
+        }
         let changed = self.read_changed();
-        if !changed.is_empty() {
+        let differs = advanced || !changed.is_empty();
+        if differs {
             self.accept(&changed);
             self.add();
         }
-        !changed.is_empty()
+        differs
     }
 
+    /// Returns the rays of all rounds so far.
     pub fn rays(&self) -> u64 {
-        self.parts().map(|(_, part)| part.rays).sum()
+        let earlier = self.plan.as_ref().map_or(0, |plan| plan.settings.base_rays);
+        earlier + self.parts().map(|(_, part)| part.rays).sum::<u64>()
     }
 
     /// Returns the seconds of rendering that a checkpoint states, or the time from the earliest to
@@ -183,13 +203,12 @@ impl FilmFiles {
     /// or a plan.
     pub fn progress(&self) -> Option<f64> {
         let (film, plan) = (&self.sum.as_ref()?.film, self.plan.as_ref()?);
-        let pixels = (film.header.width * film.header.height) as f64;
-        Some(film.samples() as f64 / (plan.spp() * pixels).max(1.0))
+        Some(film.samples() as f64 / plan.samples.max(1) as f64)
     }
 
-    /// Counts the complete shards and all shards, including the base. `None` without a plan.
+    /// Counts the complete shards and all shards. `None` without a plan.
     pub fn complete_shards(&self) -> Option<[usize; 2]> {
-        let all = self.plan.as_ref()?.settings.shards as usize + 1;
+        let all = self.plan.as_ref()?.settings.shards as usize;
         Some([self.shards_held().filter(|shard| shard.complete).count(), all])
     }
 
@@ -247,6 +266,7 @@ impl FilmFiles {
                 let contents = contents.unwrap_or_else(Contents::Refused);
                 let path = std::mem::take(&mut file.path);
                 *file = FilmFile { stamp, contents, ..FilmFile::new(path, file.shard) };
+                file.count_samples();
                 changed.push(i);
             }
         }
@@ -273,19 +293,16 @@ impl FilmFiles {
     /// Checks that all usable films can be added, and stores their common plan.
     fn try_join(&mut self) -> Result<(), String> {
         let is_alone = self.files.len() + usize::from(self.named.is_some()) == 1;
-        let named = self.named.iter_mut();
-        let mut parts: Vec<_> =
-            named.map(|plan| SourcePart { path: &plan.path, part: &mut plan.part }).collect();
-        for file in &mut self.files {
-            match &mut file.contents {
-                Contents::Part(part) => parts.push(SourcePart { path: &file.path, part }),
+        let mut parts = Vec::new();
+        for file in &self.files {
+            match &file.contents {
+                Contents::Part(part) => parts.push((&*file.path, part)),
                 Contents::Checkpoint(_) if !is_alone => return Err(without_plan(&file.path)),
                 Contents::Checkpoint(_) | Contents::Missing | Contents::Refused(_) => {}
             }
         }
-        if !parts.is_empty() {
-            self.plan = Some(join(&mut parts)?);
-        }
+        let named = self.named.as_ref().map(|job| (&*job.path, &job.head));
+        self.plan = join(named, &parts)?.or(self.plan.take().filter(|_| named.is_none()));
         Ok(())
     }
 
@@ -302,12 +319,18 @@ impl FilmFiles {
             self.files.iter_mut().filter(|file| file.first_shard().is_some()).collect();
         order.sort_by_key(|file| file.first_shard());
         let mut sum: Option<SavedFilm> = None;
-        for file in order {
-            if let Err(reason) = file.add_to(&mut sum) {
-                file.contents = Contents::Refused(reason.clone());
-                return Err(reason);
+        // The decoded files at once are a fraction of a film.
+        let at_once = (order.len() / 8).clamp(1, MOST_AT_ONCE);
+        for files in order.chunks_mut(at_once) {
+            let decoded: Vec<_> = files.par_iter().map(|file| file.decode()).collect();
+            for (file, decoded) in files.iter_mut().zip(decoded) {
+                if let Err(reason) = decoded.and_then(|decoded| file.add_to(&mut sum, decoded)) {
+                    file.contents = Contents::Refused(reason.clone());
+                    return Err(reason);
+                }
             }
         }
+        self.add_round_before(&mut sum);
         if let (Some(sum), Some(part)) = (&mut sum, self.part()) {
             part.record(&mut sum.header);
         }
@@ -315,12 +338,33 @@ impl FilmFiles {
         Ok(())
     }
 
+    /// Fills the tiles that the named plan's parts do not hold yet with those of the round before.
+    fn add_round_before(&self, sum: &mut Option<SavedFilm>) {
+        if self.files.iter().all(FilmFile::is_complete) {
+            return;
+        }
+        let mut missing: Option<Vec<bool>> = None;
+        for path in self.named.iter().flat_map(Job::previous_parts) {
+            let Ok(reader) = FilmReader::open(&path) else { continue };
+            let Ok(SavedFilm { film, .. }) = sum_with(&reader.header, sum, &path) else {
+                return;
+            };
+            let empty = |film: &Film| {
+                (0..film.tile_count()).map(|tile| film.counts(tile) == [0; 2]).collect()
+            };
+            let missing = missing.get_or_insert_with(|| empty(film));
+            // The picture lacks the tiles of a part that cannot be read.
+            let _ = reader.add_tiles(film, |tile| missing[tile]);
+        }
+    }
+
     /// Returns the common plan with all shards that the files hold. `None` without such a shard.
     pub(super) fn part(&self) -> Option<Part> {
         let mut shards: Vec<PartShard> = self.shards_held().copied().collect();
         shards.sort_unstable();
         let plan = self.plan.as_ref().filter(|_| !shards.is_empty())?;
-        Some(Part { plan: Arc::clone(plan), shards, rays: self.rays() })
+        let rays = self.rays() - plan.settings.base_rays;
+        Some(Part { plan: Arc::clone(plan), shards, rays })
     }
 }
 
@@ -349,29 +393,39 @@ impl FilmFile {
     fn first_shard(&self) -> Option<u32> {
         match &self.contents {
             Contents::Part(part) => Some(part.shards[0].number),
-            Contents::Checkpoint(_) => Some(BASE),
+            Contents::Checkpoint(_) => Some(0),
             Contents::Missing | Contents::Refused(_) => None,
         }
     }
 
-    /// Adds the film of this file to `sum`. The first film is added to an empty film with its
-    /// header. Fails if its number of samples does not fit its shards.
-    fn add_to(&mut self, sum: &mut Option<SavedFilm>) -> Result<(), String> {
-        let reader = FilmReader::open(&self.path).map_err(|error| error.to_string())?;
-        let SavedFilm { film, .. } = match sum {
-            Some(sum) => sum,
-            None => {
-                let film = reader.header.empty_film(&self.path).map_err(|e| e.to_string())?;
-                sum.insert(SavedFilm { header: reader.header.clone(), film })
-            }
-        };
-        let before = film.samples();
-        reader.add_to(film).map_err(|error| error.to_string())?;
-        self.samples = film.samples() - before;
-        if let (Contents::Part(part), None) = (&self.contents, self.total) {
-            let samples = |shard: &PartShard| part.plan.samples(shard.number);
-            self.total = Some(part.shards.iter().map(samples).sum());
+    /// Takes the numbers of samples from the header of a part.
+    fn count_samples(&mut self) {
+        if let Some(part) = self.part() {
+            let count = |i: usize| part.shards.iter().map(|shard| shard.samples[i]).sum();
+            (self.samples, self.total) = (count(0), Some(count(1)));
         }
+    }
+
+    fn decode(&self) -> Result<(FilmFileHeader, Vec<(usize, Tile)>), String> {
+        let decoded = FilmReader::open(&self.path).and_then(FilmReader::tiles);
+        decoded.map_err(|error| error.to_string())
+    }
+
+    /// Adds the `tiles` of this file to `sum`, which becomes an empty film with the header of the file
+    /// if it is `None`. Fails if the number of samples does not fit the shards.
+    fn add_to(
+        &mut self,
+        sum: &mut Option<SavedFilm>,
+        (header, tiles): (FilmFileHeader, Vec<(usize, Tile)>),
+    ) -> Result<(), String> {
+        let SavedFilm { film, .. } = sum_with(&header, sum, &self.path)?;
+        let unusable = |what: &str| format!("cannot use {}: {what}", self.path.display());
+        film.check_header(&header.film).map_err(|what| unusable(&what))?;
+        let before = film.samples();
+        tiles.into_iter().for_each(|(number, tile)| film.add_at(number, tile));
+        let after = film.samples();
+        self.count_samples();
+        self.samples = after - before;
         let (samples, expected) = (self.samples, self.total.unwrap_or(self.samples));
         if samples > expected || self.is_complete() && samples != expected {
             let path = self.path.display();
@@ -382,7 +436,7 @@ impl FilmFile {
     }
 
     fn is_complete(&self) -> bool {
-        self.part().is_some_and(|part| part.shards.iter().all(|shard| shard.complete))
+        self.part().is_some_and(Part::is_complete)
     }
 
     /// Returns the state of the file at the time `now`.
@@ -405,5 +459,21 @@ impl FilmFile {
         };
         let path = Some(self.path.clone());
         WatchedShards { shards, path, state, samples: self.samples, total: self.total, age }
+    }
+}
+
+/// Returns `sum`, which becomes an empty film with `header`, that of the file at `path`, if it is
+/// `None`.
+fn sum_with<'a>(
+    header: &FilmFileHeader,
+    sum: &'a mut Option<SavedFilm>,
+    path: &Path,
+) -> Result<&'a mut SavedFilm, String> {
+    match sum {
+        Some(sum) => Ok(sum),
+        None => {
+            let film = header.empty_film(path).map_err(|error| error.to_string())?;
+            Ok(sum.insert(SavedFilm { header: header.clone(), film }))
+        }
     }
 }

@@ -1,40 +1,48 @@
 //! Plans: renders that are divided among shards, which different processes or machines trace.
 //!
 //! A plan fixes the sample count of every tile before the shards start, because shards do not
-//! communicate. A pilot is an adaptive render that ends when its noise is still above the target.
-//! Its noise estimates predict the counts ([`Schedule::predict`]). Its samples are the *base* of
-//! the plan, the start of the sample sequence of every tile. The shards trace the rest. The sum of
-//! base and all shards therefore holds the samples `0..end` of each tile in both replicates. It
-//! equals, bit for bit, the film of a single process that has traced the same sample counts.
+//! communicate. A render takes several *rounds*, each with a plan of its own. The first plan is
+//! uniform and needs no samples. Each later one is planned from the errors that the shards of the
+//! round before report ([`Schedule::plan_round`]); the sample counts of that round are its *base*.
 //!
-//! [`Schedule::predict`]: crate::schedule::Schedule::predict
+//! A part holds all samples of its tiles, base included. The parts of one round together are
+//! therefore one film, which holds the samples `0..end` of each tile in both replicates. It equals,
+//! bit for bit, the film of a single process that has traced the same sample counts.
+//!
+//! [`Schedule::plan_round`]: crate::schedule::Schedule::plan_round
 
 mod division;
 mod file;
 mod film_files;
+mod job;
 mod merge;
 mod part;
 mod shard_render;
+mod share_report;
 #[cfg(test)]
 mod testing;
 
+pub use division::Share;
 pub use file::is_plan_file;
 pub use film_files::{FilmFiles, WatchedShards, WatchedState};
+pub use job::Job;
 pub use merge::Merged;
-pub use part::{Part, PartShard};
+pub use part::{Part, PartShard, PlanHead};
 pub use shard_render::ShardRender;
+pub use share_report::{ShareReport, TileReport};
 
-use crate::film::{Display, Estimator, Film, TILE};
+use crate::film::{Film, Header, TILE};
 pub use crate::schedule::PlannedTile;
-use crate::schedule::{Prediction, Schedule, Settings};
+use crate::schedule::{MIN_SAMPLES, Schedule, Settings, Stop, USUAL_SLOPE};
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_world::Precision;
 
+use crate::film::Display;
+
 /// Largest number of shards of a plan.
 pub const MAX_SHARDS: u32 = 1 << 16;
-
-/// Shard number of the base, the samples that a plan started from. Other shards count from 1.
-pub const BASE: u32 = 0;
+/// Largest number of samples per pixel and replicate of the first round.
+const MOST_FIRST_SAMPLES: u32 = 64;
 
 /// Inputs of a plan's samples, and its noise target.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,16 +64,22 @@ pub struct PlanSettings {
     pub noise_levels: f64,
     /// Number of shards, 1 to [`MAX_SHARDS`].
     pub shards: u32,
-    /// Checksum of the earlier plan whose merged film is the base. `None` if the base is a pilot.
+    /// Number of the round, from 1.
+    pub round: u32,
+    /// Checksum of the plan of the round before. `None` in the first round.
     pub base_plan: Option<u64>,
+    /// Number of rays of all earlier rounds.
+    pub base_rays: u64,
+    /// Expected number of rays of all rounds; 0 in the first round.
+    pub total_rays: f64,
 }
 
-/// Plan of a render: the number of samples of each tile, fixed in advance, to be divided among
+/// Plan of a round: the number of samples of each tile, fixed in advance, to be divided among
 /// shards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     pub settings: PlanSettings,
-    /// Expected RMSE of the merged picture in 8-bit levels.
+    /// Expected RMSE of the merged picture in 8-bit levels; 0 in the first round.
     pub predicted_levels: f64,
     /// Exponents p of RMSE ~ n^-p for n samples: in tiles that are not glossy, and in glossy tiles.
     pub slopes: [f64; 2],
@@ -74,100 +88,87 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Creates the plan that continues from the samples of `schedule` to its noise target.
-    /// `usual_slopes` (for tiles that are not glossy, and for glossy tiles) replace slopes that the
-    /// schedule has not measured. Returns `None` without a noise target or an estimate.
-    pub fn of_schedule(
-        schedule: &Schedule,
-        usual_slopes: [f64; 2],
-        settings: PlanSettings,
-    ) -> Option<Self> {
-        let Prediction { tiles, rmse, slopes } = schedule.predict(usual_slopes)?;
-        Some(Self { settings, predicted_levels: rmse, slopes, tiles })
+    /// Creates the plan of the first round, which is uniform: the fewest samples from which noise
+    /// can be estimated, or as many as trace a shadow ray to each light once (`light_period`).
+    pub fn first(settings: PlanSettings, light_period: u32) -> Self {
+        let period = light_period.next_power_of_two().min(MOST_FIRST_SAMPLES);
+        let cap = match settings.rays_per_pixel {
+            0 => u32::MAX,
+            rays => (rays / 2).max(1),
+        };
+        let tile = PlannedTile {
+            base: 0,
+            end: MIN_SAMPLES.max(period).min(cap),
+            rays_per_sample: 1.0,
+            glossy: false,
+            earlier: Default::default(),
+        };
+        let tiles = vec![tile; tiles_of(settings.size)];
+        Self { settings, predicted_levels: 0.0, slopes: [USUAL_SLOPE; 2], tiles }
     }
 
-    /// Returns the expected number of rays of a shard.
-    pub fn rays(&self, shard: u32) -> f64 {
-        self.rays_of(self.ranges(shard).iter().map(|range| range.len() as u32))
-    }
-
-    /// Returns the expected number of rays of base and all shards.
-    pub fn all_rays(&self) -> f64 {
-        self.rays_of(self.tiles.iter().map(|tile| tile.end))
-    }
-
-    /// Returns the expected number of rays for `counts`, samples per pixel and replicate of each
-    /// tile.
-    fn rays_of(&self, counts: impl Iterator<Item = u32>) -> f64 {
-        let samples = self.samples_of(counts);
-        samples.zip(&self.tiles).map(|(n, t)| n as f64 * f64::from(t.rays_per_sample)).sum()
-    }
-
-    /// Returns the number of samples of a shard, over all pixels and both replicates.
-    pub fn samples(&self, shard: u32) -> u64 {
-        self.samples_of(self.ranges(shard).iter().map(|range| range.len() as u32)).sum()
-    }
-
-    /// Returns the mean samples per pixel in the merged picture, over both replicates.
-    pub fn spp(&self) -> f64 {
-        let samples: u64 = self.samples_of(self.tiles.iter().map(|tile| tile.end)).sum();
-        let [width, height] = self.settings.size.map(u64::from);
-        samples as f64 / (width * height) as f64
-    }
-
-    /// Converts samples per pixel and replicate of each tile to samples of the whole tile in both
-    /// replicates.
-    fn samples_of(&self, counts: impl Iterator<Item = u32>) -> impl Iterator<Item = u64> {
-        let tiles = counts.enumerate();
-        tiles.map(|(i, count)| 2 * u64::from(count) * pixels_of(self.settings.size, i))
-    }
-
-    /// Returns the first tile in which the sample counts of `film` are not those of `shards`, which
-    /// may include [`BASE`].
-    pub fn differing_tile(&self, film: &Film, shards: &[u32]) -> Option<usize> {
-        let mut expected = vec![0u32; self.tiles.len()];
-        for shard in shards {
-            for (sum, range) in expected.iter_mut().zip(self.ranges(*shard)) {
-                *sum += range.len() as u32;
-            }
-        }
-        (0..self.tiles.len()).find(|tile| film.counts(*tile) != [expected[*tile]; 2])
-    }
-
-    /// Returns the schedule that continues `film`, which holds all samples of this plan. Returns
-    /// `None` if `estimator` has no estimate for a tile.
-    pub fn schedule(
-        &self,
-        film: &Film,
-        estimator: &Estimator,
-        settings: Settings,
-    ) -> Option<Schedule> {
-        let all = 0..self.tiles.len();
-        let error = |tile: usize| film.tile(tile).and_then(|tile| estimator.tile(tile));
-        let errors: Vec<_> = all.clone().map(error).collect();
+    /// Creates the plan of the next round after this one, whose tiles have the given reports.
+    /// Returns `None` if the noise meets its target or no tile can get samples, and fails if a tile
+    /// has no error estimate.
+    pub fn next(&self, reports: &[TileReport], noise_levels: f64) -> Result<Option<Self>, String> {
+        let errors: Vec<_> = reports.iter().map(|report| report.error).collect();
         if errors.contains(&None) {
-            return None;
+            return Err("a tile has no estimate of its noise".to_string());
         }
-        let pixels: Vec<u32> = all.map(|tile| film.tile_pixels(tile) as u32).collect();
-        Some(Schedule::of_planned(&self.tiles, &pixels, &errors, settings))
+        let pixels: Vec<u32> = (0..self.tiles.len()).map(|i| self.pixels(i) as u32).collect();
+        let mut tiles = self.tiles.clone();
+        for (tile, (report, pixels)) in tiles.iter_mut().zip(reports.iter().zip(&pixels)) {
+            let samples = |count: u32| 2.0 * f64::from(count) * f64::from(*pixels);
+            let rays = f64::from(tile.rays_per_sample) * samples(tile.base) + report.rays as f64;
+            tile.rays_per_sample = (rays / samples(tile.end).max(1.0)) as f32;
+            tile.glossy |= report.glossy;
+        }
+        let stop = Stop { noise_levels: Some(noise_levels), ..Stop::default() };
+        let cap = self.settings.rays_per_pixel;
+        let settings = Settings { rays_per_pixel: cap, ..Settings::until(stop) };
+        let schedule = Schedule::of_planned(&tiles, &pixels, &errors, settings);
+        let Some((round, total_rays)) = schedule.plan_round(self.slopes) else { return Ok(None) };
+        let settings = PlanSettings {
+            noise_levels,
+            round: self.settings.round + 1,
+            base_plan: Some(self.checksum()),
+            base_rays: self.settings.base_rays + reports.iter().map(|r| r.rays).sum::<u64>(),
+            total_rays: total_rays.round(),
+            ..self.settings.clone()
+        };
+        let (slopes, tiles) = (round.slopes, round.tiles);
+        Ok(Some(Self { settings, predicted_levels: round.rmse, slopes, tiles }))
     }
 
-    /// Quotes the first line that is not the same in the texts of two plans.
-    fn difference(&self, other: &Self) -> String {
-        let [ours, theirs] = [self, other].map(Self::text);
-        let different = ours.lines().zip(theirs.lines()).find(|(a, b)| a != b);
-        different.map_or_else(|| "one is longer".to_string(), |(a, b)| format!("`{a}` and `{b}`"))
+    /// Returns the expected number of rays of the round.
+    pub fn rays(&self) -> f64 {
+        let rays = |(i, tile): (usize, &PlannedTile)| {
+            let samples = 2 * u64::from(tile.end - tile.base) * self.pixels(i);
+            samples as f64 * f64::from(tile.rays_per_sample)
+        };
+        self.tiles.iter().enumerate().map(rays).sum()
+    }
+
+    /// Returns the number of samples of a share, base included, over all pixels and both replicates.
+    pub fn samples(&self, share: &Share) -> u64 {
+        let ranges = (share.first..).zip(&share.ranges);
+        ranges.map(|(tile, range)| 2 * range.len() as u64 * self.pixels(tile)).sum()
+    }
+
+    /// Returns the first tile in which `film` does not have the planned sample counts.
+    pub fn differing_tile(&self, film: &Film) -> Option<usize> {
+        (0..self.tiles.len()).find(|tile| film.counts(*tile) != [self.tiles[*tile].end; 2])
+    }
+
+    /// Returns the number of pixels of a tile that are inside the picture.
+    fn pixels(&self, tile: usize) -> u64 {
+        let [width, height] = self.settings.size.map(|n| n as usize);
+        let header =
+            Header { width, height, scales: Vec::new(), seed: 0, precision: Precision::Auto };
+        header.extent(tile).iter().product::<usize>() as u64
     }
 }
 
 fn tiles_of([width, height]: [u32; 2]) -> usize {
     width.div_ceil(TILE as u32) as usize * height.div_ceil(TILE as u32) as usize
-}
-
-/// Returns the number of pixels of a tile that are inside a picture of the given size.
-fn pixels_of(size: [u32; 2], tile: usize) -> u64 {
-    let [width, height] = size.map(|n| n as usize);
-    let columns = width.div_ceil(TILE);
-    let [x, y] = [tile % columns * TILE, tile / columns * TILE];
-    ((width - x).min(TILE) * (height - y).min(TILE)) as u64
 }

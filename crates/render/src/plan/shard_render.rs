@@ -1,11 +1,13 @@
 //! Render of the samples of one shard, in steps between which the film can be saved.
 
-use crate::film::TILE_PIXELS;
+use crate::film::file::{FilmFileHeader, FilmReader};
+use crate::film::{Header, TILE, TILE_PIXELS};
+use crate::plan::{Plan, PlannedTile, Share, ShareReport, TileReport};
 use crate::schedule::{Interval, SAMPLE_ALIGNMENT, Spp};
 use crate::session::{Report, State};
 use crate::wave::{Job, Wave};
 use crate::{RenderState, threads};
-use std::ops::Range;
+use std::io::Read;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -23,48 +25,120 @@ const FIRST_STEP_SAMPLES: u64 = 1 << 18;
 /// many samples: the first ones of the shard's range. A film that was saved between two steps can
 /// therefore be continued.
 pub struct ShardRender {
+    /// State with the film of the shard's rows.
     pub state: RenderState,
+    share: Share,
+    /// Planned tiles of the share.
+    planned: Vec<PlannedTile>,
+    report: ShareReport,
+    /// Properties of the film of the whole picture.
+    picture: Header,
+    /// Number of the film's first tile in the picture.
+    offset: usize,
     pool: rayon::ThreadPool,
     /// Jobs that remain to be traced, in both replicates.
     remaining: Vec<Job>,
-    /// Number of samples of the complete shard, and in the film so far, over all pixels and
-    /// replicates.
-    samples: [u64; 2],
-    pub rays: u64,
+    /// Number of samples of the complete shard, in the film so far, and in the base, over all pixels
+    /// and replicates.
+    samples: [u64; 3],
     /// Number of samples traced in all steps so far, and the seconds that they took.
     measured: (u64, f64),
 }
 
 impl ShardRender {
-    /// Creates the render of a shard with the sample indices `ranges` in each tile. The film of
-    /// `state` may already hold the first samples, which took `rays` rays. Fails if the film's
-    /// sample counts cannot come from an interrupted render of these ranges, or if a thread cannot
-    /// be started.
+    /// Creates the render of `share`, whose film replaces that of `state`. Without
+    /// [`Self::take_base`] or [`Self::resume`] it begins at the first sample. Fails if a thread
+    /// cannot be started, or without memory.
     pub fn new(
         state: RenderState,
-        ranges: &[Range<u32>],
-        rays: u64,
+        plan: &Plan,
+        share: Share,
         threads: usize,
     ) -> Result<Self, String> {
         let pool = threads::pool(threads).map_err(|error| error.to_string())?;
-        let mut remaining = Vec::new();
-        let mut samples = [0; 2];
-        for (tile, range) in ranges.iter().enumerate() {
-            let counts = state.film.counts(tile);
-            let [done, total] = [counts[0], range.len() as u32];
-            if counts[1] != done || done > total {
-                let what = format!("{counts:?} samples in A and B of tile {tile}");
-                return Err(format!("the film has {what}, which are not those of its shard"));
-            }
-            let pixels = state.film.tile_pixels(tile);
-            samples[0] += 2 * u64::from(total) * pixels;
-            samples[1] += 2 * u64::from(done) * pixels;
-            if done < total {
-                let job = Job { tile: tile as u32, first: range.start + done, count: total - done };
-                remaining.push(job);
+        let [width, height] = plan.settings.size;
+        let columns = width.div_ceil(TILE as u32);
+        let last = (share.first + share.ranges.len()).max(1) - 1;
+        let [first, last] = [share.first.min(last), last].map(|tile| tile as u32 / columns);
+        let tile = TILE as u32;
+        let state = state.into_band(first * tile..height.min((last + 1) * tile))?;
+        let picture = Header { height: height as usize, ..state.film.header.clone() };
+        let tiles = share.first..share.first + share.ranges.len();
+        let mut render = Self {
+            state,
+            planned: plan.tiles[tiles].to_vec(),
+            report: ShareReport {
+                first: share.first,
+                tiles: vec![TileReport::default(); share.ranges.len()],
+            },
+            share,
+            picture,
+            offset: (first * columns) as usize,
+            pool,
+            remaining: Vec::new(),
+            samples: [0; 3],
+            measured: (0, 0.0),
+        };
+        render.find_remaining()?;
+        Ok(render)
+    }
+
+    /// Continues the part of an earlier run of the same shard. Fails if its sample counts cannot
+    /// come from one.
+    pub fn resume<R: Read>(&mut self, part: FilmReader<R>) -> Result<(), String> {
+        let report = ShareReport::of_header(&part.header);
+        let fits = |report: &ShareReport| {
+            report.first == self.report.first && report.tiles.len() == self.report.tiles.len()
+        };
+        self.report = report.filter(fits).ok_or("it has no report of its tiles")?;
+        part.add_tiles(&mut self.state.film, |_| true).map_err(|error| error.to_string())?;
+        self.find_remaining()
+    }
+
+    /// Takes the base from parts of the round before. Tiles that these lack are traced from the
+    /// first sample.
+    pub fn take_base<R: Read>(&mut self, parts: impl Iterator<Item = FilmReader<R>>) {
+        let mut bases = vec![0; self.state.film.tile_count()];
+        for (i, planned) in self.planned.iter().enumerate() {
+            let held = if self.share.ranges[i].start == 0 { planned.base } else { 0 };
+            bases[self.share.first + i - self.offset] = held;
+        }
+        for part in parts {
+            // Tiles of a damaged part have other counts than the base, and are discarded below.
+            let _ = part.add_tiles(&mut self.state.film, |tile| bases[tile] > 0);
+        }
+        for (tile, base) in bases.iter().enumerate() {
+            if self.state.film.counts(tile) != [*base; 2] {
+                self.state.film.clear_tile(tile);
             }
         }
-        Ok(Self { state, pool, remaining, samples, rays, measured: (0, 0.0) })
+        // No tile has more samples than its base.
+        let _ = self.find_remaining();
+    }
+
+    /// Lists the jobs that remain.
+    fn find_remaining(&mut self) -> Result<(), String> {
+        self.remaining.clear();
+        self.samples = [0; 3];
+        for (i, range) in self.share.ranges.iter().enumerate() {
+            let tile = self.share.first + i - self.offset;
+            let counts = self.state.film.counts(tile);
+            let [done, total] = [counts[0], range.len() as u32];
+            if counts[1] != done || done > total {
+                let what = format!("{counts:?} samples in A and B of tile {}", tile + self.offset);
+                return Err(format!("the film has {what}, which are not those of its shard"));
+            }
+            let base = if range.start == 0 { self.planned[i].base } else { 0 };
+            let pixels = self.state.film.tile_pixels(tile);
+            for (sum, count) in self.samples.iter_mut().zip([total, done, base]) {
+                *sum += 2 * u64::from(count) * pixels;
+            }
+            if done < total {
+                let (tile, first) = (tile as u32, range.start + done);
+                self.remaining.push(Job { tile, first, count: total - done });
+            }
+        }
+        Ok(())
     }
 
     /// Traces samples for about a quarter of a second. Returns `false` if there were none to trace.
@@ -83,12 +157,25 @@ impl ShardRender {
         if wave.jobs.is_empty() {
             return false;
         }
+        let base =
+            |job: &Job| self.planned[job.tile as usize + self.offset - self.share.first].base;
+        for job in &mut wave.jobs {
+            // Rays of the base belong to another round.
+            if (job.first..job.end()).contains(&base(job)) && job.first < base(job) {
+                job.count = base(job) - job.first;
+            }
+        }
         let start = Instant::now();
         let mut traced = 0;
         for replicate in 0..2 {
             wave.replicate = replicate;
-            let report = self.state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
-            self.rays += report.iter().flatten().map(|report| report.rays).sum::<u64>();
+            let reports = self.state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
+            for (job, report) in wave.jobs.iter().zip(reports.iter().flatten()) {
+                let index = job.tile as usize + self.offset - self.share.first;
+                let tile = &mut self.report.tiles[index];
+                tile.glossy |= report.glossy;
+                tile.rays += if job.first < self.planned[index].base { 0 } else { report.rays };
+            }
         }
         // The rest of each cut job is traced next, while its tile is still in the cache.
         for (job, rest) in wave.jobs.iter().zip(&mut self.remaining) {
@@ -103,14 +190,39 @@ impl ShardRender {
         true
     }
 
-    /// Returns the share of the shard's samples that the film holds, 0..=1.
+    /// Adds the report on the tiles to the header of the part, which becomes that of a film of the
+    /// whole picture.
+    pub fn record(&self, header: &mut FilmFileHeader, complete: bool) {
+        header.film = self.picture.clone();
+        let end = |tile: usize| self.planned[tile - self.share.first].end;
+        let film = (&self.state.film, self.offset, self.state.estimator());
+        self.report.record(header, &self.share, end, complete, film);
+    }
+
+    /// Returns the reports on the tiles, without errors.
+    pub fn reports(&self) -> &[TileReport] {
+        &self.report.tiles
+    }
+
+    /// Returns the rays of the samples traced so far, without those of the base.
+    pub fn rays(&self) -> u64 {
+        self.report.tiles.iter().map(|tile| tile.rays).sum()
+    }
+
+    /// Returns the number of samples in the film and of the complete shard, over all pixels and
+    /// replicates.
+    pub fn samples(&self) -> [u64; 2] {
+        [self.samples[1], self.samples[0]]
+    }
+
+    /// Returns the share of the shard's samples after the base that the film holds, 0..=1.
     pub fn progress(&self) -> f64 {
-        let [total, done] = self.samples;
-        if total == 0 { 1.0 } else { done as f64 / total as f64 }
+        let [total, done, base] = self.samples;
+        if total == base { 1.0 } else { done.saturating_sub(base) as f64 / (total - base) as f64 }
     }
 
     pub fn report(&self) -> Report {
-        let [total, done] = self.samples;
+        let [total, done, _] = self.samples;
         let (traced, seconds) = self.measured;
         let speed = if seconds > 0.0 { traced as f64 / seconds } else { 0.0 };
         let left = (total - done) as f64 / speed.max(1.0);
@@ -121,7 +233,7 @@ impl ShardRender {
             state: State::Tracing,
             spp: Spp { min: 0, mean: spp, max: spp.ceil() as u32 },
             samples: traced,
-            rays: self.rays,
+            rays: self.rays(),
             seconds,
             eta_seconds: Some(Interval::exact(left)),
             progress: Some(self.progress()),

@@ -14,6 +14,7 @@ pub fn plan(shards: u32, tiles: &[[u32; 2]]) -> Plan {
         end: *end,
         rays_per_sample: 2.25,
         glossy: base % 2 == 0,
+        earlier: Default::default(),
     };
     Plan {
         settings: PlanSettings {
@@ -27,7 +28,10 @@ pub fn plan(shards: u32, tiles: &[[u32; 2]]) -> Plan {
             rays_per_pixel: 0,
             noise_levels: 0.25,
             shards,
+            round: 1,
             base_plan: None,
+            base_rays: 0,
+            total_rays: 0.0,
         },
         predicted_levels: 0.248,
         slopes: [0.5, 0.75],

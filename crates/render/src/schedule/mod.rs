@@ -26,7 +26,7 @@ use crate::film::{Noise, TileNoise};
 use crate::wave::{Job, JobReport, Wave};
 use convergence_fit::ConvergenceFit;
 pub use convergence_fit::Interval;
-pub use prediction::{PlannedTile, Prediction, USUAL_SLOPE};
+pub use prediction::{Goal, PlannedTile, Prediction, RoundEstimate, USUAL_SLOPE};
 pub use probing::Measurable;
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{FLATTEST, Tile, clamp_slope};
@@ -35,7 +35,7 @@ use tile::{FLATTEST, Tile, clamp_slope};
 /// from fewer samples are unreliable and take as long as tracing. With 16, tiles without noise
 /// would get a third of all samples in the scene of the mirror room, and two thirds in the scene of
 /// the reflecting tracks.
-const MIN_SAMPLES: u32 = 4;
+pub(crate) const MIN_SAMPLES: u32 = 4;
 /// Value that replaces [`MIN_SAMPLES`] if there are fewer than [`FEW_PIXELS`] effective pixels.
 /// Such a picture has no noise, or a few noisy pixels, which more samples find.
 const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;

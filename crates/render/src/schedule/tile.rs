@@ -50,7 +50,7 @@ impl Tile {
         }
     }
 
-    fn record_error(&mut self, error: TileNoise) {
+    pub fn record_error(&mut self, error: TileNoise) {
         self.error = Some(error);
         if self.history.last().is_none_or(|before| error.samples / 2 >= before.samples) {
             self.history.push(error);

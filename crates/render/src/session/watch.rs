@@ -129,7 +129,8 @@ impl Watcher {
                 generation: 1,
                 rays: self.films.rays(),
                 seconds: self.films.seconds(),
-                noise: Noise::of_tiles(tiles.iter().copied()),
+                // Tiles that no part holds yet do not count.
+                noise: Noise::of_tiles(tiles.iter().copied().filter(|tile| tile.is_some())),
                 progress: self.films.progress(),
                 threads: pool.current_num_threads(),
                 ..Report::of_samples(film)

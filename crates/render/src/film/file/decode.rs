@@ -10,7 +10,7 @@ use crate::film::file::{
 };
 use crate::film::light_weights::LightWeights;
 use crate::film::store::{Film, Header};
-use crate::film::{MAX_FILM_GROUPS, TILE};
+use crate::film::{MAX_FILM_GROUPS, TILE, Tile};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
@@ -21,7 +21,9 @@ use zerkalo_scene::value::truncated;
 use zerkalo_world::Precision;
 
 /// Number of bytes of the shortest tile record, which is the record of a tile without samples.
-const RECORD_BYTES: u64 = 8;
+const RECORD_BYTES: usize = 8;
+/// Number of bytes of tag and length of a chunk.
+const CHUNK_START: u64 = 12;
 
 /// Returns `true` if the file at `path` begins with the magic bytes of film files.
 pub fn is_film_file(path: &Path) -> bool {
@@ -34,8 +36,8 @@ pub struct FilmReader<R> {
     input: Input<R>,
     /// Contents before the tiles.
     pub header: FilmFileHeader,
-    /// First chunk after the header.
-    next: Chunk,
+    /// Tag and length of the first chunk after the header, which is read with the tiles.
+    next: Vec<u8>,
     checksums: crc32fast::Hasher,
 }
 
@@ -75,18 +77,19 @@ impl<R: Read> FilmReader<R> {
             ));
         }
         let version = input.take(4, "its version")?;
-        if version != VERSION.to_le_bytes() {
-            let version = u32::from_le_bytes([version[0], version[1], version[2], version[3]]);
+        let version = u32::from_le_bytes([version[0], version[1], version[2], version[3]]);
+        if !(2..=VERSION).contains(&version) {
             return Err(input.error(
                 format!("it has version {version} of the format, and this program reads {VERSION}"),
                 "use the program that wrote it, or render again",
             ));
         }
         checksums.update(&magic);
-        checksums.update(&VERSION.to_le_bytes());
-        let mut next = input.chunk()?;
+        checksums.update(&version.to_le_bytes());
+        let mut start = input.take(CHUNK_START, "a part")?;
         let mut chunks = BTreeMap::new();
-        while ![TILES, DONE].contains(&next.tag) {
+        while ![&TILES[..], &DONE].contains(&&start[..TILES.len()]) {
+            let next = input.chunk(&start)?;
             checksums.update(&next.tag);
             checksums.update(&(next.contents.len() as u64).to_le_bytes());
             checksums.update(&next.contents);
@@ -94,18 +97,18 @@ impl<R: Read> FilmReader<R> {
             if chunks.insert(next.tag, next.contents).is_some() {
                 return Err(input.damaged("a part of it occurs twice"));
             }
-            next = input.chunk()?;
+            start = input.take(CHUNK_START, "a part")?;
         }
         let mut header = chunks
             .remove(&HEAD)
-            .and_then(|head| decode_head(&mut Fields::new(&head), length))
+            .and_then(|head| decode_head(&mut Fields::new(&head)))
             .ok_or_else(|| input.damaged("its header has invalid values"))?;
         header.metadata = chunks
             .remove(&META)
             .and_then(|metadata| decode_metadata(&mut Fields::new(&metadata)))
             .ok_or_else(|| input.damaged("its metadata are not readable"))?;
         header.chunks = chunks;
-        Ok(Self { input, header, next, checksums })
+        Ok(Self { input, header, next: start, checksums })
     }
 
     /// Reads header and film.
@@ -117,18 +120,57 @@ impl<R: Read> FilmReader<R> {
 
     /// Adds the samples of the file to `film`. After an error, `film` may contain some of them.
     pub fn add_to(self, film: &mut Film) -> Result<FilmFileHeader, FileError> {
-        film.check_header(&self.header.film)
+        self.add_tiles(film, |_| true)
+    }
+
+    /// Adds the tiles for which `wanted` returns `true`, given their numbers in `film`, which may be
+    /// a band of the picture.
+    pub(crate) fn add_tiles(
+        self,
+        film: &mut Film,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Result<FilmFileHeader, FileError> {
+        film.check_header(&Header { height: film.header.height, ..self.header.film.clone() })
             .map_err(|what| self.input.error(what, "name a file of the same render"))?;
-        let groups = self.header.film.scales.len();
+        let first = film.first_row / TILE * film.tile_columns();
+        self.each_tile(first..first + film.tile_count(), |number, tile| {
+            if wanted(number - first) {
+                film.add_at(number - first, tile);
+            }
+        })
+    }
+
+    /// Reads header and tiles. Most of the time of reading a film is that of decoding them, which
+    /// several threads can do for several files.
+    pub(crate) fn tiles(self) -> Result<(FilmFileHeader, Vec<(usize, Tile)>), FileError> {
+        let mut tiles = Vec::new();
+        let all = 0..self.header.film.tiles();
+        let header = self.each_tile(all, |number, tile| tiles.push((number, tile)))?;
+        Ok((header, tiles))
+    }
+
+    /// Calls `each` with the tiles of `band` that have samples, and their numbers in the picture.
+    fn each_tile(
+        self,
+        band: Range<usize>,
+        mut each: impl FnMut(usize, Tile),
+    ) -> Result<FilmFileHeader, FileError> {
+        let picture = self.header.film.clone();
+        let groups = picture.scales.len();
         self.visit_tiles(|fields, numbers| {
-            for index in numbers {
-                if let Some(rest) = fields.0.strip_prefix(&[0; RECORD_BYTES as usize]) {
+            if numbers.start >= band.end || numbers.end <= band.start {
+                return Some(());
+            }
+            for number in numbers {
+                if let Some(rest) = fields.0.strip_prefix(&[0; RECORD_BYTES]) {
                     fields.0 = rest;
                     continue;
                 }
-                let mut tile = film.new_tile(index);
+                let mut tile = Tile::blank(groups, picture.extent(number));
                 tile_record::decode(&mut tile, groups, fields)?;
-                film.add_at(index, tile);
+                if band.contains(&number) {
+                    each(number, tile);
+                }
             }
             fields.is_empty().then_some(())
         })
@@ -145,8 +187,9 @@ impl<R: Read> FilmReader<R> {
         self,
         mut visit: impl FnMut(&mut Fields, Range<usize>) -> Option<()>,
     ) -> Result<FilmFileHeader, FileError> {
-        let Self { mut input, header, mut next, mut checksums } = self;
-        let all = header.film.width.div_ceil(TILE) * header.film.height.div_ceil(TILE);
+        let Self { mut input, header, next, mut checksums } = self;
+        let mut next = input.chunk(&next)?;
+        let all = header.film.tiles();
         let mut tiles = 0;
         while next.tag == TILES {
             let mut fields = Fields::new(&next.contents);
@@ -154,7 +197,7 @@ impl<R: Read> FilmReader<R> {
             let numbers =
                 numbers.map(|(first, count)| first as usize..(first as usize + count as usize));
             let numbers =
-                numbers.filter(|n| n.start == tiles && n.len() <= TILES_PER_CHUNK && n.end <= all);
+                numbers.filter(|n| n.start >= tiles && n.len() <= TILES_PER_CHUNK && n.end <= all);
             let visited = numbers.and_then(|numbers| {
                 visit(&mut fields, numbers.clone()).map(|()| tiles = numbers.end)
             });
@@ -162,15 +205,13 @@ impl<R: Read> FilmReader<R> {
                 return Err(input.damaged(format!("a tile from {tiles} on has invalid values")));
             }
             checksums.update(&next.checksum);
-            next = input.chunk()?;
+            let start = input.take(CHUNK_START, "a part")?;
+            next = input.chunk(&start)?;
         }
         let mut done = Fields::new(&next.contents);
         let expected = (all as u64, checksums.finalize());
         if next.tag != DONE || done.u64().zip(done.u32()) != Some(expected) || !done.is_empty() {
             return Err(input.damaged("its parts do not belong together"));
-        }
-        if tiles != all {
-            return Err(input.damaged(format!("it has {tiles} tiles of {all}")));
         }
         if input.left != 0 {
             return Err(input.damaged(format!("{} bytes follow its end", input.left)));
@@ -179,16 +220,13 @@ impl<R: Read> FilmReader<R> {
     }
 }
 
-/// Decodes the `HEAD` chunk of a film file of `length` bytes. Returns `None` if a field is invalid
-/// or the file is too short for its tiles.
-fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
+/// Decodes the `HEAD` chunk of a film file. Returns `None` if a field is invalid.
+fn decode_head(fields: &mut Fields) -> Option<FilmFileHeader> {
     let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
-    let tiles = width.div_ceil(TILE) as u64 * height.div_ceil(TILE) as u64;
     let sides = 1..=MAX_SIDE;
     let possible = sides.contains(&width)
         && sides.contains(&height)
-        && (1..=MAX_FILM_GROUPS).contains(&groups)
-        && tiles * RECORD_BYTES <= length;
+        && (1..=MAX_FILM_GROUPS).contains(&groups);
     if !possible {
         return None;
     }
@@ -265,9 +303,8 @@ impl<R: Read> Input<R> {
         Ok(bytes)
     }
 
-    /// Reads the next chunk and verifies its checksum.
-    fn chunk(&mut self) -> Result<Chunk, FileError> {
-        let start = self.take(12, "a part")?;
+    /// Reads the chunk that begins with `start` and verifies its checksum.
+    fn chunk(&mut self, start: &[u8]) -> Result<Chunk, FileError> {
         let (tag, length) = start.split_at(4);
         let tag: Tag = [tag[0], tag[1], tag[2], tag[3]];
         let name = truncated(&String::from_utf8_lossy(&tag)).to_string();
@@ -275,7 +312,7 @@ impl<R: Read> Input<R> {
         let contents = self.take(length, &format!("the part {name}"))?;
         let checksum = self.take(CHECKSUM_BYTES as u64, &format!("the part {name}"))?;
         let mut expected = crc32fast::Hasher::new();
-        expected.update(&start);
+        expected.update(start);
         expected.update(&contents);
         if checksum != expected.finalize().to_le_bytes() {
             return Err(self.damaged(format!("the checksum of its part {name} is wrong")));

@@ -1,5 +1,6 @@
 //! Writer of film files.
 
+use crate::film::TILE;
 use crate::film::file::{
     DONE, FilmFileHeader, HEAD, MAGIC, META, TILES, TILES_PER_CHUNK, Tag, VERSION, tile_record,
 };
@@ -57,16 +58,24 @@ pub struct EncodedFilm {
 }
 
 impl EncodedFilm {
-    /// Encodes `film`, on the threads of `pool` if there is one.
+    /// Encodes `film`, the picture of `header` or a band of it, on the threads of `pool` if there is
+    /// one.
     pub fn new(header: &FilmFileHeader, film: &Film, pool: Option<&rayon::ThreadPool>) -> Self {
         let mut pieces = vec![header.encode()];
-        let chunks = 0..film.tile_count().div_ceil(TILES_PER_CHUNK);
-        let encode = |index| encode_tiles(film, index);
+        let all = header.film.tiles();
+        let first = film.first_row / TILE * film.tile_columns();
+        let held = |tile: usize| film.counts(tile) != [0; 2];
+        // A part of a film has no chunks of the tiles that it lacks.
+        let chunks: Vec<usize> = (0..film.tile_count())
+            .step_by(TILES_PER_CHUNK)
+            .filter(|tile| (*tile..film.tile_count().min(tile + TILES_PER_CHUNK)).any(held))
+            .collect();
+        let encode = |tile: usize| encode_tiles(film, first, tile);
         match pool {
             Some(pool) => pool.install(|| pieces.par_extend(chunks.into_par_iter().map(encode))),
-            None => pieces.extend(chunks.map(encode)),
+            None => pieces.extend(chunks.into_iter().map(encode)),
         }
-        pieces.push(encode_end(film, &pieces));
+        pieces.push(encode_end(all, &pieces));
         Self { pieces }
     }
 
@@ -79,19 +88,20 @@ impl EncodedFilm {
     }
 }
 
-/// Encodes `TILE` chunk `index`. A tile in its first pass is written as one without samples.
-fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
-    let first = index * TILES_PER_CHUNK;
+/// Encodes the `TILE` chunk from tile `first` of `film` on, a band that begins with tile `offset` of
+/// the picture. A tile in its first pass is written as one without samples.
+fn encode_tiles(film: &Film, offset: usize, first: usize) -> Vec<u8> {
     let count = (film.tile_count() - first).min(TILES_PER_CHUNK);
     chunk(TILES, |out| {
-        out.extend((first as u32).to_le_bytes());
+        out.extend(((offset + first) as u32).to_le_bytes());
         out.extend((count as u32).to_le_bytes());
         (first..first + count).for_each(|tile| tile_record::encode(film.tile(tile), out));
     })
 }
 
-/// Encodes the last chunk of a film file. `pieces` are the encoded header and tile chunks.
-fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
+/// Encodes the last chunk of the file of a film with `tiles` tiles. `pieces` are the encoded header
+/// and tile chunks.
+fn encode_end(tiles: usize, pieces: &[Vec<u8>]) -> Vec<u8> {
     let mut checksum = crc32fast::Hasher::new();
     // The checksum covers the whole header, but only the own checksum of each tile chunk.
     for (i, piece) in pieces.iter().enumerate() {
@@ -100,7 +110,7 @@ fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     }
     let checksum = checksum.finalize();
     chunk(DONE, |out| {
-        out.extend((film.tile_count() as u64).to_le_bytes());
+        out.extend((tiles as u64).to_le_bytes());
         out.extend(checksum.to_le_bytes());
     })
 }

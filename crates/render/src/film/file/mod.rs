@@ -12,7 +12,7 @@
 //! | `HEAD` | width, height, number of light groups (u32 each); for each group its scale and its weights in red, green, blue (f64 each) and its name; seed (u64); precision; exposure in stops (f64); tone curve |
 //! | `META` | number of entries (u32), then key and value of each, as in the metadata of pictures |
 //! | others | contents that this module does not interpret, in the order of their tags |
-//! | `TILE` | number of the first tile and number of tiles (u32 each), then the records of up to 64 consecutive tiles, row by row |
+//! | `TILE` | number of the first tile and number of tiles (u32 each), then the records of up to 64 consecutive tiles, row by row, in ascending order; tiles that no chunk names have no samples |
 //! | `DONE` | number of tiles (u64), and the CRC-32 (u32) of all bytes before the first `TILE` chunk and the checksums of the `TILE` chunks; the end of the file |
 //!
 //! A text has its length in bytes (u32) before it. A tile record consists of
@@ -32,7 +32,7 @@ mod decode;
 mod encode;
 #[cfg(test)]
 mod tests;
-mod tile_record;
+pub(crate) mod tile_record;
 
 pub use decode::{Fields, FilmReader, is_film_file};
 pub use encode::{EncodedFilm, text};
@@ -48,8 +48,8 @@ use zerkalo_scene::process_memory::missing_memory;
 
 /// First bytes of a film file.
 const MAGIC: [u8; 8] = *b"\x89ZKF\r\n\x1a\n";
-/// Version of the film file format that is written and read.
-const VERSION: u32 = 2;
+/// Version of the film file format that is written. Version 2, which is read, too, names all tiles.
+const VERSION: u32 = 3;
 /// Number of tiles in a `TILE` chunk, fewer in the last one.
 const TILES_PER_CHUNK: usize = 64;
 /// Largest width and height, in pixels, of a film that is read from a file.

@@ -11,7 +11,7 @@ const LARGEST_SAMPLE: u64 = 1 << 49;
 const WORD: usize = 8;
 
 /// Appends the record of `tile` to `out`; `None` is a tile that was never written.
-pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
+pub(crate) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     let Some(tile) = tile.filter(|tile| tile.counts != [0; 2]) else {
         return out.extend([0; 8]);
     };
@@ -50,7 +50,7 @@ fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
 }
 
 /// Reads a record into `tile`, which must be empty. Returns `None` if the record is invalid.
-pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Option<()> {
+pub(crate) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Option<()> {
     tile.counts = [fields.u32()?, fields.u32()?];
     tile.saturated_samples = fields.u64()?;
     tile.bad_samples = fields.u64()?;
