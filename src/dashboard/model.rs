@@ -244,6 +244,8 @@ pub struct Model {
     pub last_edit: Option<Duration>,
     /// `true` if the program quits as soon as the pending save has succeeded.
     pub quit_when_saved: bool,
+    /// `true` after the request to quit: later messages keep no edits that the user has discarded.
+    pub quits: bool,
     /// Scene that opens as soon as the unsaved edits are saved or discarded.
     pub next_scene: Option<SceneSource>,
     /// `true` if a PNG is written as soon as the render ends.
@@ -308,6 +310,7 @@ impl Model {
                 is_new: false,
                 unreadable,
             },
+            display: Display { tone: scene.film.tone, ..Display::default() },
             history: History::new(scene),
             stop,
             first_time: true,
