@@ -82,6 +82,11 @@ fn no_scene(path: &Path) -> Option<String> {
         Some("png" | "exr" | "hdr" | "jpg" | "jpeg") => Some(format!(
             "{shown} is a picture, not a scene: `zerkalo info {shown}` tells its origin"
         )),
+        None if !path.exists() && matches!(SceneSource::of(&shown), SceneSource::File(_)) => {
+            (!shown.starts_with(':')).then(|| {
+                format!("there is no file {shown}; the name of a new scene ends in .toml: `zerkalo {shown}.toml`")
+            })
+        }
         _ if folder.is_some_and(|folder| !folder.is_dir()) => {
             let folder = folder.unwrap_or(path).display().to_string();
             Some(format!("{shown}: there is no folder {}", sanitized(&folder)))

@@ -217,6 +217,8 @@ pub struct Model {
     pub pictures: Pictures,
     /// `true` if a histogram replaces the convergence plot.
     pub histogram: bool,
+    /// Channel before the probe, to which its end returns; `None` without one.
+    pub channel_before_probe: Option<DisplayChannel>,
     /// Film pixel (column, row) of the pixel probe.
     pub probe: Option<[usize; 2]>,
     /// Latest snapshot of the session.

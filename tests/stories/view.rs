@@ -77,6 +77,13 @@ fn tone_curve_is_that_of_the_scene_from_the_first_frame() {
 }
 
 #[test]
+fn end_of_the_probe_returns_to_the_view_before_it() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("i v v Esc");
+    assert_eq!(desk.model.channel, DisplayChannel::Beauty);
+}
+
+#[test]
 fn export_that_is_written_now_says_so_at_once() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Ctrl-e Enter Ctrl-e `n`");

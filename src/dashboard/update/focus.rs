@@ -58,6 +58,10 @@ impl UpdateContext<'_> {
         if self.model.mode == Mode::Probe {
             self.set_probe(None);
         }
+        if let Some(channel) = self.model.channel_before_probe.take() {
+            self.model.channel = channel;
+            self.repaint();
+        }
         self.model.mode = Mode::Orbit;
     }
 

@@ -87,6 +87,7 @@ impl UpdateContext<'_> {
         if let Some(export) = &mut self.model.export {
             (export.progress, export.left) = (1.0, None);
             self.emit(Effect::FinishExport);
+            self.say("writing the picture as it is, after a whole pass");
         }
     }
 
