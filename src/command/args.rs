@@ -73,8 +73,8 @@ pub struct TerminalArgs {
 /// Option of every command that traces.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct ThreadArgs {
-    /// Number of tracing threads, at most 16, or four per processor if that is more [default: one
-    /// per processor]
+    /// Number of tracing threads, 1 to 4096, of which at most 16, or four per processor if that is
+    /// more, are started [default: one per processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
     threads: Option<u16>,
 }

@@ -23,6 +23,9 @@ use zerkalo_terminal::Environment;
 
 pub fn run(args: &EditArgs, preferences: Preferences) -> Result<(), Failure> {
     let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
+    if let Some(reason) = args.scene.as_deref().and_then(no_scene) {
+        return Err(Failure::Usage(reason));
+    }
     let environment = terminal_environment(&format!(
         "`zerkalo render {scene} -o PICTURE.png` renders without one"
     ))?;
@@ -65,6 +68,31 @@ pub fn run(args: &EditArgs, preferences: Preferences) -> Result<(), Failure> {
         trace: args.trace.clone(),
     };
     conclude(&run_dashboard(setup)?, io::stdout().lock())
+}
+
+/// Returns the reason why `path` names no scene, and what to do; `None` if it may name one.
+fn no_scene(path: &Path) -> Option<String> {
+    let shown = sanitized(&path.display().to_string());
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    match extension.as_deref() {
+        Some("obj" | "ply" | "stl" | "gltf" | "glb") => Some(format!(
+            "{shown} is a mesh, not a scene: `zerkalo new-scene.toml` begins one, where `a mesh` Enter adds it"
+        )),
+        Some("png" | "exr" | "hdr" | "jpg" | "jpeg") => Some(format!(
+            "{shown} is a picture, not a scene: `zerkalo info {shown}` tells its origin"
+        )),
+        None if !path.exists() && matches!(SceneSource::of(&shown), SceneSource::File(_)) => {
+            (!shown.starts_with(':')).then(|| {
+                format!("there is no file {shown}; the name of a new scene ends in .toml: `zerkalo {shown}.toml`")
+            })
+        }
+        _ if folder.is_some_and(|folder| !folder.is_dir()) => {
+            let folder = folder.unwrap_or(path).display().to_string();
+            Some(format!("{shown}: there is no folder {}", sanitized(&folder)))
+        }
+        _ => None,
+    }
 }
 
 /// Prints the results of a dashboard: names of written files on `out`, everything else on stderr.

@@ -133,6 +133,14 @@ fn parse(mut command: clap::Command) -> Cli {
         let first = std::env::args_os().nth(1).unwrap_or_default();
         let first = first.to_string_lossy();
         let unknown = !first.starts_with('-') && Cli::command().find_subcommand(&*first).is_none();
+        let last = std::env::args_os().next_back().unwrap_or_default();
+        let last = last.to_string_lossy();
+        if error.kind() == ErrorKind::MissingRequiredArgument
+            && [".png", ".exr"].iter().any(|extension| last.ends_with(extension))
+        {
+            let what = format!("`-o {last}` writes the picture to this file");
+            end(&Cli::command().error(error.kind(), what))
+        }
         let kinds = [ErrorKind::ArgumentConflict, ErrorKind::UnknownArgument];
         if kinds.contains(&error.kind()) && unknown && !Path::new(&*first).exists() {
             end(&unknown_command(&first).0)

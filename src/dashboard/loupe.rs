@@ -1,6 +1,6 @@
 //! Loupe: a small window over the picture in which a half cell shows one film pixel.
 
-use crate::dashboard::{DisplayChannel, Layout, Model, Overlay};
+use crate::dashboard::{DisplayChannel, Layout, Mode, Model, Overlay};
 use ratatui::layout::Rect;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -70,7 +70,9 @@ impl Model {
     pub fn loupe(&self, layout: &Layout) -> Option<LoupeLayout> {
         let report = &self.snapshot.as_ref()?.report;
         let is_wanted = match self.loupe.mode {
-            LoupeMode::Automatic => matches!(report.state, State::Tracing | State::Paused),
+            LoupeMode::Automatic => {
+                matches!(report.state, State::Tracing | State::Paused) && !self.is_aiming()
+            }
             LoupeMode::On => true,
             LoupeMode::Off => false,
         };
@@ -104,6 +106,12 @@ impl Model {
         let y = if is_lower { image.bottom() - height } else { image.y };
         let frame = Rect { x, y, width, height };
         Some(LoupeLayout { frame, window: Window { origin, size } })
+    }
+
+    /// Returns `true` while the user moves the view or the selection, which the loupe must not cover.
+    fn is_aiming(&self) -> bool {
+        let moves = matches!(self.mode, Mode::Move | Mode::Rotate) || self.drag.is_some();
+        moves || self.free_view.is_some() && self.marks_until.is_some()
     }
 
     /// Takes target and pixels of the loupe from the new snapshot.

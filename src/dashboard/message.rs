@@ -42,6 +42,8 @@ pub enum Message {
     Opened(Box<Result<OpenedScene, SceneErrors>>),
     /// Result of [`Effect::ListScenes`]: names for [`SceneSource::of`], each with a note.
     Scenes(Vec<(String, &'static str)>),
+    /// Result of [`Effect::CompletePath`]: the text, and the paths that begin with it.
+    Paths(String, Vec<String>),
     /// Another program has changed a mesh or image of the scene.
     AssetsChanged,
     OrphanedEdits(OrphanedEdits),
@@ -208,6 +210,12 @@ pub enum Effect {
     Open(SceneSource),
     /// List the scenes that can be opened.
     ListScenes,
+    /// List the paths that begin with this text.
+    CompletePath {
+        text: String,
+        /// `true` if they are relative to the folder of the scene file.
+        beside_scene: bool,
+    },
     /// Write the current picture as an image with the next free name, such as `room-2.png`.
     Export(Format),
     /// Write the samples of this scene as a checkpoint with the next free name.

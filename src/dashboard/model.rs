@@ -217,6 +217,8 @@ pub struct Model {
     pub pictures: Pictures,
     /// `true` if a histogram replaces the convergence plot.
     pub histogram: bool,
+    /// Channel before the probe, to which its end returns; `None` without one.
+    pub channel_before_probe: Option<DisplayChannel>,
     /// Film pixel (column, row) of the pixel probe.
     pub probe: Option<[usize; 2]>,
     /// Latest snapshot of the session.
@@ -244,6 +246,8 @@ pub struct Model {
     pub last_edit: Option<Duration>,
     /// `true` if the program quits as soon as the pending save has succeeded.
     pub quit_when_saved: bool,
+    /// `true` after the request to quit: later messages keep no edits that the user has discarded.
+    pub quits: bool,
     /// Scene that opens as soon as the unsaved edits are saved or discarded.
     pub next_scene: Option<SceneSource>,
     /// `true` if a PNG is written as soon as the render ends.
@@ -308,6 +312,7 @@ impl Model {
                 is_new: false,
                 unreadable,
             },
+            display: Display { tone: scene.film.tone, ..Display::default() },
             history: History::new(scene),
             stop,
             first_time: true,

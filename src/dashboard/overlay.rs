@@ -70,6 +70,8 @@ pub struct PickEntry {
     pub keys: String,
     /// Other words by which the search finds the entry.
     pub also: String,
+    /// `true` if a search lists the entry after others that match as well.
+    pub comes_late: bool,
 }
 
 impl From<Word> for PickEntry {
@@ -80,7 +82,8 @@ impl From<Word> for PickEntry {
 
 impl PickEntry {
     pub fn new(name: String, note: &str) -> Self {
-        Self { name, note: note.to_string(), keys: String::new(), also: String::new() }
+        let (keys, also) = (String::new(), String::new());
+        Self { name, note: note.to_string(), keys, also, comes_late: false }
     }
 }
 
@@ -107,6 +110,7 @@ pub struct Prompt {
     /// Description of valid text, for the user.
     pub help: String,
     pub editor: Editor,
+    pub takes_path: bool,
     /// Function that applies the text, or returns the reason why the text is not valid.
     pub(super) apply: fn(&mut UpdateContext<'_>, &str) -> Result<(), String>,
 }

@@ -28,7 +28,7 @@ impl Model {
         let [width, height] = self.screen;
         let centred = |wide: u16, rows: u16| {
             // Status line and hint line stay visible.
-            let (columns, rows) = (wide.min(width - 2), rows.min(height - 2));
+            let (columns, rows) = (wide.min(width), rows.min(height - 2));
             let [x, y] = [(width - columns) / 2, (height - 2 - rows) / 2];
             Rect { x, y, width: columns, height: rows }
         };
@@ -42,8 +42,9 @@ impl Model {
                 ..OverlayLayout::default()
             },
             Overlay::NoiseTargets(_) => {
-                let about = wrapped_rows(ABOUT, 76.min(width - 2) - 5);
-                let frame = low(76, QUALITIES.len() as u16 + 2 + about);
+                let columns = 76.min(width - 2);
+                let about = wrapped_rows(ABOUT, columns - 5);
+                let frame = low(columns, QUALITIES.len() as u16 + 2 + about);
                 let (list, below) = divided(frame.inner(BORDER), QUALITIES.len() as u16);
                 let help = Rect { x: below.x + 3, width: below.width - 3, ..below };
                 OverlayLayout { frame, input: Rect::default(), list, help }
@@ -55,7 +56,9 @@ impl Model {
                 };
                 let wide = widest(|e| &e.name) + widest(|e| &e.note) + widest(|e| &e.keys) + 12;
                 let rows = (pick.entries.len() as u16).saturating_add(3);
-                let frame = centred(u16::try_from(wide).unwrap_or(width).clamp(84, 160), rows);
+                let wide = u16::try_from(wide).unwrap_or(width).clamp(84, 160);
+                // A border one column beside that of the panels would look double.
+                let frame = centred(if wide + 2 < width { wide } else { width }, rows);
                 let (input, list) = divided(frame.inner(BORDER), 1);
                 OverlayLayout { frame, input, list, help: Rect::default() }
             }

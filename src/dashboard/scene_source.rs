@@ -49,13 +49,14 @@ impl SceneSource {
     }
 }
 
-/// Returns `true` if `path` names a scene file that can be created: there is no such file, nor
-/// unsaved edits of it, its extension is `toml`, and its folder exists.
+/// Returns `true` if `path` names a scene file that can be created: there is no such file or it is
+/// empty, there are no unsaved edits of it, its extension is `toml`, and its folder exists.
 pub fn is_new(path: &Path) -> bool {
     let missing = |error: std::io::Error| error.kind() == ErrorKind::NotFound;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let is_empty = path.metadata().is_ok_and(|file| file.is_file() && file.len() == 0);
     path.extension().is_some_and(|extension| extension == "toml")
-        && path.symlink_metadata().is_err_and(missing)
+        && (is_empty || path.symlink_metadata().is_err_and(missing))
         && Recovery::new(Some(path), "", None).find().orphans.is_empty()
         && folder.unwrap_or(Path::new(".")).is_dir()
 }

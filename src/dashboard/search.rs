@@ -18,30 +18,25 @@ pub fn has_words(text: &str, wanted: &str) -> bool {
 }
 
 /// Returns the rank of `entry` among the matches of the words `wanted`, the smallest first. Returns
-/// `None` if the entry does not match: each word must begin or be in a word of the name, begin one
-/// of the other words, or have its letters in the name, in this order.
+/// `None` if the entry does not match: each word must begin or be in a word of the name, or begin
+/// one of the other words.
 pub fn rank(wanted: &[String], entry: &PickEntry) -> Option<usize> {
     let name = words(&entry.name);
-    if wanted == name {
-        return Some(0);
-    }
-    let letters = name.concat();
     let rank_of = |word: &String| {
         let begins = |own: &String| own.starts_with(word);
-        let has_letters = || {
-            let mut left = letters.chars();
-            word.chars().all(|c| left.any(|letter| letter == c))
-        };
         match word {
             _ if name.first().is_some_and(begins) => Some(1),
             _ if name.iter().any(begins) => Some(2),
             _ if [&entry.also, &entry.note].iter().any(|text| has_words(text, word)) => Some(3),
-            _ if letters.contains(word) => Some(8),
-            _ if has_letters() => Some(16),
+            _ if name.iter().any(|own| own.contains(word)) => Some(8),
             _ => None,
         }
     };
     let mut rank = wanted.iter().map(rank_of).sum::<Option<usize>>()?;
+    if wanted == name {
+        rank = 0;
+    }
+    rank += if entry.comes_late { 3 } else { 0 };
     let first = name.first().map_or("", String::as_str);
     if OPPOSITES.contains(&first) && !wanted.iter().any(|word| first.starts_with(word)) {
         rank += 4;
@@ -55,7 +50,7 @@ mod tests {
 
     fn entry(name: &str, also: &str) -> PickEntry {
         let (name, also) = (name.to_string(), also.to_string());
-        PickEntry { name, also, note: String::new(), keys: String::new() }
+        PickEntry { also, ..PickEntry::new(name, "") }
     }
 
     #[test]
@@ -70,8 +65,11 @@ mod tests {
         let rough = entry("roughness of mirror", "blur");
         assert_eq!(rank("roughness of mirror", &rough), Some(0));
         assert_eq!([rank("rough mir", &rough), rank("blur", &rough)], [Some(3), Some(3)]);
-        assert!(rank("rgm", &rough) > rank("ness", &rough));
-        assert_eq!(rank("zebra", &rough), None);
+        assert!(rank("ness", &rough) > rank("blur", &rough));
+        assert_eq!([rank("rgm", &rough), rank("zebra", &rough)], [None, None]);
+        let ball = entry("gold cube", "");
+        let kind = PickEntry { comes_late: true, ..entry("cube", "") };
+        assert!(rank("cube", &ball) < rank("cube", &kind));
         assert!(has_words("color.r", "col r") && !has_words("color.r", "olor"));
     }
 }

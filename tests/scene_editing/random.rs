@@ -55,11 +55,8 @@ fn compound(levels: u32) -> BoxedStrategy<Shape> {
     };
     let transform =
         prop_oneof![2 => Just(Vec::new()), 1 => proptest::collection::vec(step(), 1..3)];
-    let part = (inner, transform).prop_map(|(shape, transform)| CsgOperand {
-        shape,
-        material: String::new(),
-        transform,
-    });
+    let part = (inner, transform)
+        .prop_map(|(shape, transform)| CsgOperand { transform, ..CsgOperand::new(shape) });
     (proptest::collection::vec(part, 2..4), 0..3)
         .prop_map(|(of, kind)| match kind {
             0 => Shape::Union(Union { of }),

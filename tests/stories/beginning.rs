@@ -15,7 +15,7 @@ pub fn count(keys: &str) -> usize {
 fn new_file_becomes_a_lit_scene_and_a_picture_in_seventy_keys() {
     let mut desk = Desk::on_new_file();
     assert!(desk.model.is_empty() && !desk.model.is_unsaved());
-    let keys = "a `gold` Enter a `glass` Enter a `diffuse` Enter a `floor` Enter a `mirror` Enter \
+    let keys = "a `gold` Enter a `glass` Enter a `red` Enter a `floor` Enter a `mirror` Enter \
                 A `warm` Enter A `cool` Enter Ctrl-s Ctrl-e Ctrl-u `1920x1080` Enter";
     assert!(count(keys) <= 70, "{} keys", count(keys));
     desk.keys(keys);

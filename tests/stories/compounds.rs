@@ -129,15 +129,17 @@ fn parts_are_added_duplicated_and_deleted() {
         assert_eq!(desk.text(), text, "{keys}");
     }
     let (mut desk, _) = desk();
-    desk.keys("Down x");
+    desk.keys("Down e `base` Enter");
+    assert!(desk.text().contains("name = \"base\""), "{}", desk.text());
+    desk.keys("x");
     let goblet = &desk.scene().objects[3];
     assert_eq!(
         (goblet.shape.key(), goblet.material.as_str(), goblet.name.as_str()),
         ("difference", "red", "goblet")
     );
     for (keys, reason) in [
-        ("Down Enter Enter `rectangle` Enter", "flat"),
-        ("Down e", "no name"),
+        ("Down Enter Up Enter `rectangle` Enter", "flat"),
+        ("Home e", "no name"),
         ("Home Alt-a", "no compound"),
         ("Home B", "no compound"),
     ] {
@@ -215,8 +217,8 @@ fn goblet_story_takes_at_most_45_keys() {
     let text = include_str!("../../scenes/gallery-metals.toml");
     let mut desk = Desk::new(text);
     let objects = desk.scene().objects.len();
-    let keys = "/ `goblet` Enter Tab Right Down Alt-s `1.3` Enter Left S `cop` Enter m Right Right Esc \
-                D Right Esc / `bell` Enter x";
+    let keys =
+        "/ `foot` Enter Alt-s `1.3` Enter Esc S `cop` Enter m Right Right D Right / `bell` Enter x";
     desk.keys(keys);
     assert_eq!(desk.scene().objects.len(), objects, "one more, one less");
     let goblet = desk.scene().objects.iter().find(|o| o.name == "goblet").unwrap();

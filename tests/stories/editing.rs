@@ -79,7 +79,7 @@ fn typed_value_is_applied_before_another_command() {
 
 #[test]
 fn vector_or_colour_can_be_typed_into_any_component() {
-    let mut desk = desk(BALL, "Enter Down Down Down `1, 2 -3` Enter");
+    let mut desk = desk(BALL, "Enter `1, 2 -3` Enter");
     let Shape::Sphere(sphere) = &desk.scene().objects[1].shape else { panic!() };
     assert_eq!(sphere.center, [1.0, 2.0, -3.0]);
     desk.select(Target::Material("red".into()));
@@ -89,13 +89,13 @@ fn vector_or_colour_can_be_typed_into_any_component() {
 
 #[test]
 fn choices_are_selected_from_list_or_stepped() {
-    let mut desk = desk(BALL, "Enter Enter");
+    let mut desk = desk(BALL, "Enter Up Up Enter");
     assert!(
         matches!(&desk.model.overlay, Some(Overlay::Pick(pick)) if pick.entries[0].name == "mirror")
     );
     desk.keys("m Enter");
     assert_eq!(desk.scene().objects[1].material, "mirror");
-    desk.keys("u Up Right");
+    desk.keys(": `undo` Enter Right");
     assert_ne!(desk.scene().objects[1].material, "red");
     desk.select(Target::Light(0));
     desk.keys("End Enter");

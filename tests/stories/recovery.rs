@@ -114,3 +114,13 @@ fn suspend_emits_no_other_effect() {
     desk.keys("? Ctrl-z");
     assert_eq!(desk.effects, [Effect::Suspend, Effect::Suspend]);
 }
+
+#[test]
+fn discarded_edits_are_not_kept_by_later_messages() {
+    for keys in ["] q `d`", "] : `q!` Enter"] {
+        let mut desk = Desk::new(ROOM);
+        desk.keys(keys).send(Message::ConnectionRate(None));
+        let last = desk.effects.iter().rfind(|effect| matches!(effect, Effect::Autosave(_)));
+        assert_eq!(last, Some(&Effect::Autosave(None)), "{keys}");
+    }
+}

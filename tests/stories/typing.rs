@@ -1,6 +1,8 @@
 //! Stories of stray keys: in no widget does text that is typed run a command.
 
 use super::*;
+use zerkalo_scene::edit::Widget;
+use zerkalo_scene::material::Preset;
 
 /// Keys that a hand may hit anywhere, and that must change nothing.
 const STRAY: [&str; 11] = ["b", ".", "4", ",", "<", ">", "(", ")", "+", "-", "#"];
@@ -50,7 +52,16 @@ fn stray_keys_change_nothing_on_any_row() {
                 continue;
             }
             desk.model.inspector.cursor = line;
-            unchanged(&mut desk, &format!("line {line} of {target:?}"), &STRAY);
+            let place = format!("line {line} of {target:?}");
+            unchanged(&mut desk, &place, &[&STRAY[..], &["x"]].concat());
+            let types_letters = field.is_some_and(|field| {
+                !matches!(field.property.widget, Widget::Numbers | Widget::Switch)
+            });
+            if types_letters {
+                desk.keys("Tab Tab");
+                desk.model.inspector.cursor = line;
+                unchanged(&mut desk, &place, &["g", "o", "l", "d", "x", "D"]);
+            }
         }
     }
 }
@@ -65,7 +76,7 @@ fn no_command_runs_while_text_is_typed() {
         ("a form", "a Enter Down Down"),
         ("an editor in a form", "a Enter `rad` Enter `2`"),
         ("the kinds of objects", "a"),
-        ("a picker", "Enter Enter"),
+        ("a picker", "Enter Up Enter"),
         ("the palette", ":"),
         ("a prompt", "e"),
         ("the noise targets", "N"),
@@ -78,12 +89,72 @@ fn no_command_runs_while_text_is_typed() {
     }
 }
 
+/// Returns the names that the list which `key` opens finds for `text`.
+fn found_in(key: &str, text: &str) -> Vec<String> {
+    let mut desk = Desk::new(ROOM);
+    desk.keys(&format!("{key} `{text}`"));
+    let Some(Overlay::Pick(pick)) = &desk.model.overlay else { panic!("no list") };
+    pick.found.iter().map(|i| pick.entries[*i].name.clone()).collect()
+}
+
 /// Returns the names that the palette finds for `text`.
 fn found(text: &str) -> Vec<String> {
+    found_in(":", text)
+}
+
+#[test]
+fn parts_that_are_ready_are_found_first() {
+    for (text, first) in [
+        ("blue", "blue ball"),
+        ("matte", "red ball"),
+        ("dif", "red ball"),
+        ("chrome", "chrome ball"),
+        ("cube", "gold cube"),
+        ("window", "cool window"),
+        ("tap cyl", "tapered cylinder"),
+        ("sphere", "sphere"),
+    ] {
+        assert_eq!(found_in("a", text).first().map(String::as_str), Some(first), "{text}");
+    }
     let mut desk = Desk::new(ROOM);
-    desk.keys(&format!(": `{text}`"));
-    let Some(Overlay::Pick(pick)) = &desk.model.overlay else { panic!("no palette") };
-    pick.found.iter().map(|i| pick.entries[*i].name.clone()).collect()
+    desk.keys("a `wood` Enter `blue` Enter");
+    assert_eq!(desk.scene().objects[3].name, "blue ball", "typed anew after no match");
+    desk.keys("a `tap cyl` Enter Enter");
+    assert_eq!(desk.scene().objects[4].shape.key(), "tapered_cylinder", "{}", desk.notice());
+}
+
+#[test]
+fn fields_of_the_inspector_keep_the_cursor_and_take_words() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Target::Object(1));
+    desk.keys("Enter / `rad` Enter `.3` Enter x `.4` Enter");
+    let Shape::Sphere(ball) = &desk.scene().objects[1].shape else { panic!("no ball") };
+    assert_eq!((ball.radius, desk.scene().objects.len()), (0.4, 3));
+    desk.select(Target::Material("red".into()));
+    desk.keys("Home `gold` Enter");
+    assert_eq!(desk.scene().materials["red"].preset, Some(Preset::Gold), "{}", desk.notice());
+    desk.keys("[ [ [ [ [ [ [ [");
+    assert_eq!(desk.scene().materials["red"].roughness, 0.0);
+    desk.keys("]");
+    assert_eq!(desk.scene().materials["red"].roughness, 0.01);
+}
+
+#[test]
+fn tab_completes_paths() {
+    let mut desk = Desk::new(ROOM);
+    let paths = |names: &[&str]| names.iter().map(|name| name.to_string()).collect::<Vec<_>>();
+    desk.keys("a `mesh` Enter `d` Tab");
+    let asked = Effect::CompletePath { text: "d".into(), beside_scene: true };
+    assert!(desk.asked(|e| *e == asked));
+    desk.send(Message::Paths("d".into(), paths(&["duck.obj", "dune.obj"])));
+    assert_eq!(desk.editor().unwrap().text(), "du");
+    desk.send(Message::Paths("d".into(), paths(&["dune.obj"])));
+    assert_eq!(desk.editor().unwrap().text(), "du", "too late");
+    desk.send(Message::Paths("du".into(), paths(&["duck.obj", "dune.obj"])));
+    assert!(desk.notice().contains("duck.obj  dune.obj"));
+    desk.keys("Esc Esc : `e d` Tab");
+    desk.send(Message::Paths("d".into(), paths(&["den.toml"])));
+    assert_eq!(desk.editor().unwrap().text(), "e den.toml");
 }
 
 #[test]
@@ -102,6 +173,7 @@ fn palette_finds_actions_fields_and_parts_by_other_words() {
         ("ior", "ior of mirror"),
         ("fov", "vertical of camera"),
         ("floor", "select object \"floor\""),
+        ("eye.x", "eye.x of camera"),
     ] {
         assert!(found(text).iter().take(3).any(|name| name == first), "{text}: {:?}", found(text));
     }
@@ -174,10 +246,10 @@ fn deletion_takes_only_what_was_selected_and_undo_selects_it() {
 fn colours_and_calculations_are_typed_into_fields() {
     let mut desk = Desk::new(ROOM);
     desk.select(Target::Material("red".into()));
-    desk.keys("Enter / `col` Enter Enter `gold` Enter");
+    desk.keys("Enter / `col` Enter `gold` Enter");
     let gold = zerkalo_scene::value::Color::from_hex("#ffd700").unwrap();
     assert_eq!(desk.scene().materials["red"].color, gold);
-    desk.keys("/ `refl` Enter `.25` Enter Up *");
+    desk.keys("/ `refl` Enter `.25` Enter *");
     desk.keys("`2` Enter");
     assert_eq!(desk.scene().materials["red"].reflection, 0.5);
 }

@@ -69,3 +69,25 @@ fn orbit_stops_above_the_floor() {
     desk.keys("Down Up");
     assert!(eye(&desk)[1] > below, "{below}");
 }
+
+#[test]
+fn tone_curve_is_that_of_the_scene_from_the_first_frame() {
+    let desk = Desk::new(&ROOM.replace("[film]", "[film]\ntone = \"neutral\""));
+    assert_eq!(desk.model.display.tone.name(), "neutral");
+}
+
+#[test]
+fn end_of_the_probe_returns_to_the_view_before_it() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("i v v Esc");
+    assert_eq!(desk.model.channel, DisplayChannel::Beauty);
+}
+
+#[test]
+fn export_that_is_written_now_says_so_at_once() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("Ctrl-e Enter Ctrl-e `n`");
+    desk.send(Message::ExportProgress(Some((0.0, None))));
+    assert!(desk.asked(|effect| *effect == Effect::FinishExport));
+    assert!(desk.model.export.is_some_and(|export| export.progress == 1.0));
+}

@@ -311,7 +311,7 @@ fn errors_in_parts_name_the_part() {
 #[test]
 fn compound_nesting_depth_is_limited() {
     let sphere = || Shape::from_text("sphere = { center = [0, 0, 0], radius = 1 }").unwrap();
-    let part = |shape| CsgOperand { shape, material: String::new(), transform: Vec::new() };
+    let part = CsgOperand::new;
     let mut shape = sphere();
     for depth in 1..=MAX_DEPTH + 1 {
         shape = Shape::Union(crate::shape::Union { of: vec![part(shape), part(sphere())] });

@@ -52,8 +52,11 @@ impl EffectRunner {
     ) -> io::Result<Self> {
         let session = Session::new(threads, options.clone(), Settings::until(DEFAULT_STOP))?;
         let files = Files::new(file, state, results.clone())?;
-        let exporter =
-            Exporter { file: Some(files.shared.clone()), sampler: options.sampling.kind };
+        let exporter = Exporter {
+            file: Some(files.shared.clone()),
+            sampler: options.sampling.kind,
+            film_size: None,
+        };
         let editing = Editing { files, resized: None, threads, options };
         Ok(Self { session, exporter, editing: Some(editing), exporting: None, results })
     }
@@ -70,7 +73,7 @@ impl EffectRunner {
             // Sending fails only at the end of the program, when the receiver is gone.
             let _ = reports.send(Message::Watched(Box::new(report)));
         })?;
-        let exporter = Exporter { file: None, sampler: SamplerKind::Sobol };
+        let exporter = Exporter { file: None, sampler: SamplerKind::Sobol, film_size: None };
         Ok(Self { session, exporter, editing: None, exporting: None, results })
     }
 
@@ -106,6 +109,9 @@ impl EffectRunner {
             Effect::Load => self.edit(|editing| editing.files.give(Job::Load)),
             Effect::Open(source) => self.edit(|editing| editing.files.give(Job::Open(source))),
             Effect::ListScenes => self.edit(|editing| editing.files.give(Job::List)),
+            Effect::CompletePath { text, beside_scene } => {
+                self.edit(|editing| editing.files.give(Job::Complete(text, beside_scene)));
+            }
             Effect::Autosave(scene) => self.edit(|editing| editing.files.autosave(scene)),
             Effect::Recover => {
                 self.edit(|editing| editing.files.give_autosave(AutosaveJob::Recover));
@@ -137,10 +143,13 @@ impl EffectRunner {
     fn export_sized(&mut self, scene: Arc<Scene>, format: Format, display: Display, stop: Stop) {
         let Some(editing) = &mut self.editing else { return };
         let options = Options { display, ..editing.options.clone() };
+        let file = editing.files.shared.get();
+        let film_size = file.map(|file| file.document.scene().film.size);
+        let exporter = Exporter { film_size, ..self.exporter.clone() };
         let settings = Settings::until(stop);
         let started = Session::new(editing.threads, options, settings).and_then(|mut session| {
             session.set_scene(scene);
-            ResizedExport::start(session, format, self.exporter.clone(), self.results.clone())
+            ResizedExport::start(session, format, exporter, self.results.clone())
         });
         match started {
             Ok(export) => editing.resized = Some(export),

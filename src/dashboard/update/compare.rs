@@ -99,6 +99,7 @@ impl UpdateContext<'_> {
             return;
         }
         self.enter_mode(Mode::Probe);
+        self.model.channel_before_probe = Some(self.model.channel);
         let [width, height] = self.scene().film.size.map(|n| n as usize);
         self.set_probe(Some([width / 2, height / 2]));
     }

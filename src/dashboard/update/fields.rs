@@ -53,29 +53,27 @@ impl UpdateContext<'_> {
         self.row().filter(|row| row.act == RowAct::Edit)
     }
 
-    /// Returns `true` if the cursor is on a property that takes text.
-    pub(super) fn is_on_text(&self) -> bool {
-        self.field().is_some_and(|field| field.property.widget == Widget::Text)
-    }
-
-    /// Moves the cursor of the inspector from a first line with text to the next, where letters run
-    /// commands.
+    /// Moves the cursor of the inspector from the first line to the first one where letters run
+    /// commands, if there is one.
     pub(super) fn skip_text(&mut self) {
-        if self.model.context() == KeyContext::Inspector
-            && self.model.inspector.cursor == 0
-            && self.is_on_text()
-        {
-            self.move_field_cursor(1);
+        if self.model.context() != KeyContext::Inspector || self.model.inspector.cursor != 0 {
+            return;
         }
+        let runs = |line: &PanelLine| {
+            let widget = line.entry().map(|row| row.property.widget);
+            matches!(widget, Some(Widget::Numbers | Widget::Switch))
+        };
+        self.model.inspector.cursor = self.model.field_lines().iter().position(runs).unwrap_or(0);
     }
 
-    /// Confirms what is being typed and moves on, or carries out Enter on the row under the cursor.
+    /// Confirms what is being typed, or carries out Enter on the row under the cursor. In a form, a
+    /// confirmed value leads on to the next row.
     pub(super) fn open_row(&mut self) {
         if self.end_filter() {
             return;
         }
         if self.model.field_list().editor.is_some() {
-            if self.apply_field() {
+            if self.apply_field() && self.in_form() {
                 self.move_field_cursor(1);
             }
             return;
@@ -105,10 +103,7 @@ impl UpdateContext<'_> {
             self.step_field(1.0);
         } else if !words.is_empty() && !self.in_form() {
             let cursor = words.iter().position(|word| word.name == field.value);
-            self.open_pick(field.label, words, cursor.unwrap_or(0), |c, word| {
-                c.fill_field(word);
-                c.move_field_cursor(1);
-            });
+            self.open_pick(field.label, words, cursor.unwrap_or(0), |c, word| c.fill_field(word));
         } else {
             self.set_editor(Some(Editor::replacing(field.value)));
         }

@@ -13,7 +13,7 @@ use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{SaveError, Scene, SceneErrors};
 use zerkalo_terminal::stores_files;
 
-const KEEP_FILE: Answer = ('k', "keep the file on disk", |c| c.decline());
+const KEEP_FILE: Answer = ('c', "cancel: keep the file on disk", |c| c.decline());
 const KEEP_EDITS: Answer = ('k', "keep my edits", |c| c.decline());
 const OVERWRITE: Answer = ('o', "overwrite it", |c| c.write(None, true));
 const STAY: Answer = ('c', "stay", |c| c.decline());
@@ -285,10 +285,10 @@ impl UpdateContext<'_> {
                 let stores = stores_files(&self.model.graphics.terminal);
                 let stored = if stores { ", Y downloads it" } else { "" };
                 let shown = match is_image {
-                    true => format!("o shows it{stored}{later}  ·  "),
+                    true => format!("  ·  o shows it{stored}{later}"),
                     false => String::new(),
                 };
-                let text = format!("{}  {description}  ·  {shown}{advice}", path.display());
+                let text = format!("{}  {description}  ·  {advice}{shown}", path.display());
                 if is_image {
                     self.model.last_export = Some(path);
                 }
@@ -311,8 +311,11 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns `text` with its first letter in upper case.
+/// Returns `text` with its first letter in upper case, unless it begins with the name of a file.
 pub(super) fn capital(text: &str) -> String {
+    if text.split(' ').next().is_some_and(|word| word.contains(['.', '/'])) {
+        return text.to_string();
+    }
     let mut chars = text.chars();
     chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
 }

@@ -24,7 +24,8 @@ impl UpdateContext<'_> {
     }
 
     /// Leaves the first of these states that is active: filter, overlay, text editor, mode,
-    /// marks, focus on another panel, zoom, full screen, comparison.
+    /// marks, selection of a part instead of its compound, focus on another panel, zoom, full screen,
+    /// comparison.
     pub(super) fn leave(&mut self) {
         if self.end_filter() {
             return;
@@ -37,6 +38,8 @@ impl UpdateContext<'_> {
             self.end_mode();
         } else if !self.model.marked.is_empty() {
             self.model.marked.clear();
+        } else if let Some(compound) = self.model.selection.compound() {
+            self.select(compound);
         } else if self.model.focus != Focus::Picture {
             self.model.focus = Focus::Picture;
         } else if self.model.zoom.is_some() {
@@ -54,6 +57,10 @@ impl UpdateContext<'_> {
         self.end_gesture();
         if self.model.mode == Mode::Probe {
             self.set_probe(None);
+        }
+        if let Some(channel) = self.model.channel_before_probe.take() {
+            self.model.channel = channel;
+            self.repaint();
         }
         self.model.mode = Mode::Orbit;
     }

@@ -1,21 +1,40 @@
 //! Creation of objects and lights: the user picks a kind, then fills in a form.
 
 use crate::dashboard::update::Coalesce;
-use crate::dashboard::{FieldList, Form, Overlay, UpdateContext};
+use crate::dashboard::{FieldList, Form, Overlay, PickEntry, UpdateContext};
 use std::sync::Arc;
-use zerkalo_scene::edit::{self, Edit, EditError};
+use zerkalo_scene::edit::{self, Edit, EditError, Word};
+
+/// Returns the entries of a list of what can be added: kinds, whose properties a form asks for, then
+/// parts that are ready, which a search finds first.
+fn added(kinds: Vec<Word>, ready: Vec<Word>) -> Vec<PickEntry> {
+    let kind = |kind: Word| PickEntry {
+        comes_late: true,
+        ..PickEntry::new(readable(&kind.name), &kind.doc)
+    };
+    kinds.into_iter().map(kind).chain(ready.into_iter().map(PickEntry::from)).collect()
+}
+
+/// Returns the key of a kind as a name for users.
+fn readable(kind: &str) -> String {
+    kind.replace('_', " ")
+}
 
 impl UpdateContext<'_> {
     pub(super) fn pick_object(&mut self) {
-        let entries = [edit::object_kinds(), edit::ready_objects()].concat();
-        self.open_pick("add an object", entries, 0, |c, name| {
-            match edit::object_kinds().iter().any(|kind| kind.name == name) {
-                true => {
-                    c.open_form(name, c.edit_seen(|seen| edit::add_object(seen, name, None)));
+        let ready = [edit::ready_objects(self.scene()), edit::ready_lights()].concat();
+        let entries = added(edit::object_kinds(), ready);
+        self.open_pick(
+            "add an object or a light",
+            entries,
+            0,
+            |c, name| match edit::object_kinds().iter().find(|kind| readable(&kind.name) == name) {
+                Some(kind) => {
+                    c.open_form(name, c.edit_seen(|seen| edit::add_object(seen, &kind.name, None)));
                 }
-                false => c.add_ready_made(c.edit_seen(|seen| edit::add_ready_object(seen, name))),
-            }
-        });
+                None => c.add_ready_made(c.edit_seen(|seen| edit::add_ready_made(seen, name))),
+            },
+        );
     }
 
     pub(super) fn pick_part(&mut self) {
@@ -23,20 +42,21 @@ impl UpdateContext<'_> {
         if let Err(refusal) = edit {
             return self.refuse(&refusal.to_string());
         }
-        self.open_pick("add a part", edit::part_kinds(), 0, |c, name| {
-            c.open_form(name, edit::add_part(c.scene(), &c.model.selection, name));
+        self.open_pick("add a part", added(edit::part_kinds(), Vec::new()), 0, |c, name| {
+            let kind = name.replace(' ', "_");
+            c.open_form(name, edit::add_part(c.scene(), &c.model.selection, &kind));
         });
     }
 
     pub(super) fn pick_light(&mut self) {
-        let entries = [edit::light_kinds(), edit::ready_lights()].concat();
+        let entries = added(edit::light_kinds(), edit::ready_lights());
         self.open_pick("add a light", entries, 0, |c, name| {
             match edit::light_kinds().iter().any(|kind| kind.name == name) {
                 true => {
                     let edit = c.edit_seen(|seen| edit::add_light(seen, name));
                     c.open_form(&format!("{name} light"), edit);
                 }
-                false => c.add_ready_made(c.edit_seen(|seen| edit::add_ready_light(seen, name))),
+                false => c.add_ready_made(c.edit_seen(|seen| edit::add_ready_made(seen, name))),
             }
         });
     }

@@ -1,6 +1,6 @@
 //! Key dispatch: an open text editor receives a key first, then the command table.
 
-use crate::dashboard::update::commands::{Command, lookup};
+use crate::dashboard::update::commands::{Command, HintLine, lookup};
 use crate::dashboard::{Editor, FieldList, KeyContext, Model, Overlay, UpdateContext};
 use zerkalo_scene::edit::Widget;
 use zerkalo_terminal::event::{Code, Key};
@@ -75,6 +75,19 @@ impl UpdateContext<'_> {
         {
             return;
         }
+        // Another command on objects accepts a move or rotation first.
+        let is_of_mode =
+            |context: &KeyContext| matches!(context, KeyContext::Moving | KeyContext::Rotating);
+        if self.moves_or_rotates()
+            && command.chapter == "objects"
+            && !command.keys.iter().any(|(context, _)| is_of_mode(context))
+            && !command
+                .hints
+                .iter()
+                .any(|hint| hint.lines.contains(&HintLine::In(KeyContext::Moving)))
+        {
+            self.end_mode();
+        }
         self.typed = typed(key);
         self.run(command);
     }
@@ -124,6 +137,18 @@ impl UpdateContext<'_> {
         let begins_number = "0123456789.-+*#".contains(c);
         match widget {
             Some(Widget::Text) if c.is_alphanumeric() => self.type_value(c),
+            Some(Widget::Color) if c.is_alphabetic() => self.type_value(c),
+            Some(Widget::Choice | Widget::Kind | Widget::List)
+                if c.is_alphabetic() && !self.in_form() =>
+            {
+                self.open_field();
+                self.paste(&c.to_string());
+            }
+            _ if c == 'x' && !self.in_form() => {
+                self.say(
+                    "x deletes in the outline and in the picture · Backspace sets the default",
+                );
+            }
             Some(Widget::Numbers | Widget::Color) if begins_number => self.type_value(c),
             _ if begins_number => self.say("This row takes no number · Enter edits it"),
             _ if !self.in_form() => return false,

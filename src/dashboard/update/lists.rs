@@ -3,7 +3,7 @@
 use crate::dashboard::panel_lines::{outline_position, walked};
 use crate::dashboard::search::{rank, words};
 use crate::dashboard::{
-    Answer, Editor, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
+    Answer, Editor, Effect, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
     UpdateContext,
 };
 use zerkalo_render::schedule::Stop;
@@ -77,8 +77,11 @@ impl UpdateContext<'_> {
                 if pick.takes_commands && self.typed_command(&text) {
                     return;
                 }
-                let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
-                let Some(found) = pick.found.get(pick.at.index) else { return };
+                let Some(Overlay::Pick(pick)) = &mut self.model.overlay else { return };
+                let Some(found) = pick.found.get(pick.at.index) else {
+                    pick.editor.untouched = true;
+                    return;
+                };
                 let (name, take) = (pick.entries[*found].name.clone(), pick.take);
                 self.model.overlay = None;
                 take(self, &name);
@@ -135,6 +138,9 @@ impl UpdateContext<'_> {
     /// Completes the text that is being typed, or goes to the next group of fields; `by` is 1 or, to
     /// the previous one, -1.
     pub(super) fn complete(&mut self, by: isize) {
+        if let Some((text, beside_scene)) = self.typed_path().filter(|_| by > 0) {
+            return self.emit(Effect::CompletePath { text, beside_scene });
+        }
         match &mut self.model.overlay {
             Some(Overlay::Pick(pick)) if by > 0 => {
                 if let Some(found) = pick.found.get(pick.at.index) {
@@ -151,6 +157,47 @@ impl UpdateContext<'_> {
         }
     }
 
+    /// Returns the path that is being typed, and `true` if it is relative to the folder of the scene file.
+    fn typed_path(&self) -> Option<(String, bool)> {
+        let list = self.model.field_list();
+        let path = |text: &str, beside| Some((text.to_string(), beside));
+        match &self.model.overlay {
+            Some(Overlay::Pick(pick)) if pick.takes_commands => {
+                let (word, rest) = pick.editor.text().split_once(' ')?;
+                path(rest, false).filter(|_| ["e", "w"].contains(&word))
+            }
+            Some(Overlay::Prompt(prompt)) if prompt.takes_path => path(prompt.editor.text(), false),
+            None | Some(Overlay::Form(_)) => {
+                let editor = list.editor.as_ref().filter(|_| list.filter.is_none())?;
+                let field = self.field()?;
+                path(editor.text(), true).filter(|_| field.property.key.ends_with("file"))
+            }
+            Some(_) => None,
+        }
+    }
+
+    /// Completes the path that is being typed as far as all `paths` agree, which begin with `text`. If
+    /// that is no further, shows their names.
+    pub(super) fn complete_path(&mut self, text: &str, paths: &[String]) {
+        if self.typed_path().is_none_or(|(typed, _)| typed != text) {
+            return;
+        }
+        let Some(first) = paths.first() else {
+            return self.say(format!("no file begins with {text}"));
+        };
+        let agreed = |(i, c): &(usize, char)| paths.iter().all(|path| path[*i..].starts_with(*c));
+        let end = first.char_indices().take_while(agreed).map(|(i, c)| i + c.len_utf8()).last();
+        let more = first[..end.unwrap_or(0)].strip_prefix(text).unwrap_or_default().to_string();
+        if more.is_empty() && paths.len() > 1 {
+            let start = text.rfind('/').map_or(0, |slash| slash + 1);
+            self.say(paths.iter().map(|path| &path[start..]).collect::<Vec<_>>().join("  "));
+        } else if let Some(editor) = self.model.editor_mut() {
+            editor.untouched = false;
+            editor.paste(&more);
+            self.search();
+        }
+    }
+
     /// Updates the open list to the entries that match the search text, best match first.
     pub(super) fn search(&mut self) {
         if self.model.field_list().filter.is_some() {
@@ -163,8 +210,9 @@ impl UpdateContext<'_> {
             Some(field) => field.split(' ').next().unwrap_or_default(),
             None => text,
         };
+        let names_file = pick.takes_commands && ["e ", "w "].iter().any(|ex| text.starts_with(ex));
         let wanted = words(wanted);
-        let ranked = pick.entries.iter().enumerate();
+        let ranked = pick.entries.iter().enumerate().filter(|_| !names_file);
         let mut ranked: Vec<_> =
             ranked.filter_map(|(i, entry)| Some((rank(&wanted, entry)?, i))).collect();
         ranked.sort_unstable();

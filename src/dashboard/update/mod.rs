@@ -134,6 +134,7 @@ impl UpdateContext<'_> {
             Message::MendedOnDisk => self.model.file.broken = None,
             Message::Opened(result) => self.opened(*result),
             Message::Scenes(scenes) => self.pick_scene(scenes),
+            Message::Paths(text, paths) => self.complete_path(&text, &paths),
             Message::AssetsChanged => self.assets_changed(),
             Message::OrphanedEdits(edits) => self.orphaned_edits(edits),
             Message::Warning(text) => self.notify(Tone::Bad, capital(&text), None),
@@ -141,7 +142,7 @@ impl UpdateContext<'_> {
             Message::ExportProgress(progress) => match (&mut self.model.export, progress) {
                 (Some(export), Some((progress, left))) => {
                     export.progress = progress.max(export.progress);
-                    export.left = left;
+                    export.left = left.or(export.left).filter(|_| export.progress < 1.0);
                 }
                 (export, _) => *export = None,
             },

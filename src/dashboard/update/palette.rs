@@ -47,6 +47,7 @@ impl PickEntry {
             note: command.chapter.to_string(),
             keys: command.formatted_keys(watching, str::to_string),
             also: command.also.to_string(),
+            comes_late: false,
         }
     }
 }
@@ -59,7 +60,7 @@ impl UpdateContext<'_> {
             self.model.recent.iter().position(|name| *name == entry.name).unwrap_or(usize::MAX)
         };
         entries.sort_by_key(recent);
-        let title = "actions, fields and parts · w  q  set FIELD VALUE";
+        let title = "actions, fields and parts · w  q  q!  wq  x  e FILE  set FIELD VALUE";
         self.open_pick(title, entries, 0, |c, name| c.choose(name));
         if let Some(Overlay::Pick(pick)) = &mut self.model.overlay {
             pick.takes_commands = true;
@@ -119,13 +120,17 @@ impl UpdateContext<'_> {
         let scene = self.scene();
         let mut names = HashSet::new();
         for field in self.reachable_fields() {
-            let name = format!("{} of {}", field.property.label, field.target.label(scene));
-            if names.insert(name.clone()) {
-                let last = field.property.key.rsplit('.').next();
-                let also = SYNONYMS.iter().find(|(key, _)| Some(*key) == last);
-                let also = also.map_or("", |(_, words)| words).to_string();
-                let entry = PickEntry { also, ..PickEntry::new(name, &field.property.value) };
-                list.push((entry, Choice::Edit(Box::new(field))));
+            let last = field.property.key.rsplit('.').next();
+            let also = SYNONYMS.iter().find(|(key, _)| Some(*key) == last);
+            let also = also.map_or("", |(_, words)| words).to_string();
+            let shown =
+                [(&field.property.label, &field.property.value), (&field.label, &field.value)];
+            for (label, value) in shown {
+                let name = format!("{label} of {}", field.target.label(scene));
+                if names.insert(name.clone()) {
+                    let entry = PickEntry { also: also.clone(), ..PickEntry::new(name, value) };
+                    list.push((entry, Choice::Edit(Box::new(field.clone()))));
+                }
             }
         }
         for (section, target) in outline(scene) {
@@ -160,6 +165,7 @@ impl UpdateContext<'_> {
         match choice {
             Choice::Run(command) => self.run(command),
             Choice::Select(target) => {
+                self.end_mode();
                 self.select(target);
                 let label = self.model.selection.label(self.scene());
                 self.say(label);
@@ -182,8 +188,8 @@ impl UpdateContext<'_> {
         let is_edited = self.model.is_unsaved();
         let label = match (word, rest) {
             ("w", "") => "save",
-            ("wq", "") if is_edited => "save",
-            ("q" | "wq", "") => "quit",
+            ("wq" | "x", "") if is_edited => "save",
+            ("q" | "wq" | "x", "") => "quit",
             ("e", "") => "read the file again",
             _ => "",
         };
@@ -191,7 +197,7 @@ impl UpdateContext<'_> {
         let palette = self.model.overlay.take();
         let result = match word {
             _ if !label.is_empty() => {
-                self.model.quit_when_saved = word == "wq" && is_edited;
+                self.model.quit_when_saved = label == "save" && word != "w";
                 self.choose(label);
                 Ok(())
             }

@@ -24,7 +24,9 @@ impl UpdateContext<'_> {
     ) {
         let (title, help) = (title.to_string(), help.to_string());
         let editor = Editor::replacing(text);
-        self.model.overlay = Some(Overlay::Prompt(Prompt { title, help, editor, apply }));
+        let takes_path = title == "save as";
+        self.model.overlay =
+            Some(Overlay::Prompt(Prompt { title, help, editor, takes_path, apply }));
     }
 
     pub(super) fn ask_path(&mut self) {
@@ -43,7 +45,8 @@ impl UpdateContext<'_> {
             Target::Light(i) => scene.lights.get(*i).map(|light| light.name.clone()),
             Target::Object(i) => scene.objects.get(*i).map(|object| object.name.clone()),
             Target::Material(name) | Target::View(name) => Some(name.clone()),
-            _ => None,
+            Target::Part(..) => Some(label.clone()),
+            Target::Camera | Target::Settings(_) => None,
         };
         match name {
             Some(name) => {
@@ -132,7 +135,7 @@ impl UpdateContext<'_> {
             let [width, height] = export.size;
             let percent = 100.0 * export.progress;
             let text = format!("{width}x{height} is being rendered: {percent:.0} %.");
-            let finish: Answer = ('n', "write it now", |c| c.emit(Effect::FinishExport));
+            let finish: Answer = ('n', "write it now", |c| c.finish_export());
             let cancel: Answer = ('x', "cancel it", |c| c.cancel_export());
             return self.ask(text, &[finish, cancel, ('l', "let it go on", |c| c.decline())]);
         }
@@ -205,11 +208,12 @@ impl UpdateContext<'_> {
         let film = edit::set(self.seen(), &Target::Settings(SceneSettings::Film), "size", size);
         let scene = film?.scene;
         let size = scene.film.size;
-        self.model.export = Some(RunningExport { size, progress: 0.0, left: None });
+        let left = self.expected_seconds(&scene);
+        self.model.export = Some(RunningExport { size, progress: 0.0, left });
         let (display, stop) = (self.model.display, self.model.stop);
         self.emit(Effect::ExportSized { scene: Arc::new(scene), format, display, stop });
         self.say(format!(
-            "rendering {}x{} beside this picture · Ctrl-e writes it now",
+            "rendering {}x{} beside this picture · Ctrl-e n writes it now",
             size[0], size[1]
         ));
         Ok(())

@@ -73,7 +73,8 @@ impl UpdateContext<'_> {
     /// none or the user quits.
     pub(super) fn autosave(&mut self) {
         let quit = self.effects.iter().position(|effect| *effect == Effect::Quit);
-        let unsaved = quit.is_none() && !self.model.file.unreadable && self.model.is_unsaved();
+        self.model.quits |= quit.is_some();
+        let unsaved = !self.model.quits && !self.model.file.unreadable && self.model.is_unsaved();
         let scene = unsaved.then(|| Arc::clone(self.model.history.scene()));
         let [now, before] = [&scene, &self.model.autosaved].map(|s| s.as_ref().map(Arc::as_ptr));
         if now != before {

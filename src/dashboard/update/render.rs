@@ -5,8 +5,9 @@ use crate::dashboard::update::cycled;
 use crate::dashboard::update::prompt::stop_text;
 use crate::dashboard::{Effect, Format, ListCursor, Overlay, UpdateContext};
 use std::sync::Arc;
-use zerkalo_render::schedule::Stop;
+use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{QUALITIES, State};
+use zerkalo_scene::Scene;
 
 impl UpdateContext<'_> {
     pub(super) fn pause(&mut self) {
@@ -64,6 +65,30 @@ impl UpdateContext<'_> {
         let scene = Arc::clone(self.model.seen());
         self.emit(Effect::Checkpoint(scene));
         self.say("writing a checkpoint …");
+    }
+
+    /// Returns the time of a render of `scene`, which is this picture at another size, by the time of
+    /// this one.
+    pub(super) fn expected_seconds(&self, scene: &Scene) -> Option<Interval> {
+        let report = &self.model.snapshot.as_ref()?.report;
+        let (left, share) = match report.state {
+            State::Finished(_) => (Interval::exact(0.0), 1.0),
+            // Both renders share the processors until this one has ended.
+            _ => (report.eta_seconds?, 2.0),
+        };
+        let pixels = |size: [u32; 2]| f64::from(size[0]) * f64::from(size[1]);
+        let factor = share * pixels(scene.film.size) / pixels(self.scene().film.size);
+        let [low, high] = [left.low, left.high].map(|left| factor * (report.seconds + left));
+        Some(Interval { low, high })
+    }
+
+    /// Writes the picture of the running export as it is, or after its first pass.
+    pub(super) fn finish_export(&mut self) {
+        if let Some(export) = &mut self.model.export {
+            (export.progress, export.left) = (1.0, None);
+            self.emit(Effect::FinishExport);
+            self.say("writing the picture as it is, after a whole pass");
+        }
     }
 
     pub(super) fn cancel_export(&mut self) {

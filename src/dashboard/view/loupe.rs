@@ -15,7 +15,8 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) -> Option<(Bu
     let loupe = model.loupe(layout)?;
     let detail = model.loupe.detail.as_ref().filter(|detail| detail.size == loupe.window.size)?;
     let [x, y] = [0, 1].map(|i| loupe.window.origin[i] + loupe.window.size[i] / 2);
-    let title = seen(model, [x, y]).map_or("1:1".to_string(), |name| format!("1:1  {name}"));
+    let title =
+        seen(model, [x, y]).map_or("1:1 · G".to_string(), |name| format!("1:1  {name} · G"));
     painter.overlay(loupe.frame, &cut(&title, usize::from(loupe.frame.width.saturating_sub(6))));
     let ends = [0, 1].map(|i| (loupe.window.origin[i], loupe.window.size[i] - 1));
     for (corner, right, lower) in [('┌', 0, 0), ('┐', 1, 0), ('└', 0, 1), ('┘', 1, 1)] {

@@ -77,7 +77,11 @@ impl OverlayPainter<'_, '_> {
         let cursor = typed(&pick.editor, &mut input);
         if pick.found.is_empty() {
             let style = self.theme.dim();
-            self.painter.row(self.place.list, 0).skip(3).put("no match", style);
+            let text = match pick.editor.text().starts_with(['e', 'w']) && pick.takes_commands {
+                true => "Tab completes the path",
+                false => "no match · Enter: type anew",
+            };
+            self.painter.row(self.place.list, 0).skip(3).put(text, style);
         }
         let names = pick.entries.iter().map(|entry| columns(&entry.name)).max().unwrap_or(0);
         let (list, border) = (self.place.list, self.theme.border(true));

@@ -53,7 +53,9 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     if let Some(export) = &model.export {
         let [width, height] = export.size;
         let left = export.left.map_or(String::new(), |left| format!("  {} left", durations(left)));
-        let text = format!("writing {width}×{height}  {:.0} %{left}", 100.0 * export.progress);
+        let done = format!("{:.0} %{left}", 100.0 * export.progress);
+        let done = if export.progress < 1.0 { &done } else { "…" };
+        let text = format!("writing {width}×{height}  {done}");
         parts.push(part(0, vec![(text, theme.accent())]));
     }
     if model.fullscreen && model.free_view.is_some() {

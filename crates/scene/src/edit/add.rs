@@ -29,7 +29,7 @@ pub fn light_kinds() -> Vec<Word> {
 
 /// Names and linear colours of new materials. A new material gets the first colour that no other one
 /// has.
-const PALETTE: [(&str, [f64; 3]); 6] = [
+pub(super) const PALETTE: [(&str, [f64; 3]); 6] = [
     ("red", [0.85, 0.16, 0.11]),
     ("blue", [0.13, 0.28, 0.8]),
     ("green", [0.15, 0.62, 0.28]),

@@ -35,23 +35,22 @@ pub(super) fn operand_mut<'a>(
     siblings(scene, i, path)?.get_mut(*path.last()?)
 }
 
-/// Returns an object, or a part as a nameless object in the space of its compound.
+/// Returns an object, or a part as an object in the space of its compound.
 pub(super) fn body(scene: &Scene, target: &Target) -> Result<Object, EditError> {
-    let found =
-        if let Target::Part(i, path) = target {
-            operand(scene, *i, path).cloned().map(|CsgOperand { shape, material, transform }| {
-                Object { name: String::new(), material, shape, transform }
-            })
-        } else if let Target::Object(i) = target {
-            scene.objects.get(*i).cloned()
-        } else {
-            None
-        };
+    let found = if let Target::Part(i, path) = target {
+        operand(scene, *i, path).cloned().map(|CsgOperand { name, shape, material, transform }| {
+            Object { name, material, shape, transform }
+        })
+    } else if let Target::Object(i) = target {
+        scene.objects.get(*i).cloned()
+    } else {
+        None
+    };
     found.ok_or_else(|| EditError::gone(target))
 }
 
-fn part_of(Object { material, shape, transform, .. }: Object) -> CsgOperand {
-    CsgOperand { shape, material, transform }
+fn part_of(Object { name, material, shape, transform }: Object) -> CsgOperand {
+    CsgOperand { name, shape, material, transform }
 }
 
 /// Replaces the object or part `target` by `body`.
@@ -198,6 +197,9 @@ pub fn join(scene: &Scene, targets: &[Target], kind: &str) -> Result<Edit, EditE
         if part.material == material {
             part.material.clear();
         }
+        if *i == first {
+            part.name.clear();
+        }
         part
     };
     let of: Vec<_> = indices.iter().map(part).collect();
@@ -232,8 +234,8 @@ pub fn dissolve(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
     } else if let Target::Object(i) = target {
         next.objects.remove(*i);
         for (n, part) in parts.enumerate() {
-            let name =
-                if n == 0 { whole.name.clone() } else { free_object(&next, part.shape.key()) };
+            let own = if part.name.is_empty() { part.shape.key() } else { &part.name };
+            let name = if n == 0 { whole.name.clone() } else { free_object(&next, own) };
             next.objects.insert(i + n, Object { name, ..part });
         }
     }
@@ -245,7 +247,7 @@ fn freed(part: &CsgOperand, whole: &Object) -> Object {
     let inherits = part.material.is_empty();
     let material = if inherits { &whole.material } else { &part.material }.clone();
     let transform = [&part.transform[..], &whole.transform].concat();
-    Object { name: String::new(), material, shape: part.shape.clone(), transform }
+    Object { name: part.name.clone(), material, shape: part.shape.clone(), transform }
 }
 
 /// Removes a part. The last part of a compound takes its place. Returns the target to select.

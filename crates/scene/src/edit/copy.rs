@@ -1,7 +1,7 @@
 //! Duplicating, deleting and renaming of objects, lights, materials and stored cameras.
 
 use crate::edit::bounds::bounds;
-use crate::edit::compound::{body, copy_part, material, remove_part, set_body};
+use crate::edit::compound::{body, copy_part, material, operand_mut, remove_part, set_body};
 use crate::edit::parse_value::name;
 use crate::edit::placement::place_for;
 use crate::edit::translate::{move_by, move_object, moved};
@@ -166,8 +166,8 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     notes.into_iter().flatten().reduce(|whole, in_parts| format!("{whole} {in_parts}"))
 }
 
-/// Renames an object, a light, a material or a stored camera. Fails for a name that exists already
-/// or is not printable. Only objects and lights may have an empty name.
+/// Renames an object, a part, a light, a material or a stored camera. Fails for a name that exists
+/// already or is not printable. Only objects, parts and lights may have an empty name.
 pub fn rename(scene: &Scene, target: &Target, new: &str) -> Result<Edit, EditError> {
     if !target.exists(scene) {
         return Err(EditError::gone(target));
@@ -203,7 +203,13 @@ pub fn rename(scene: &Scene, target: &Target, new: &str) -> Result<Edit, EditErr
             next.cameras.extend(moved.map(|view| (new.clone(), view)));
             Target::View(new.clone())
         }
-        Target::Part(..) | Target::Camera | Target::Settings(_) => {
+        Target::Part(i, path) => {
+            operand_mut(&mut next, *i, path)
+                .into_iter()
+                .for_each(|part| part.name.clone_from(&new));
+            target.clone()
+        }
+        Target::Camera | Target::Settings(_) => {
             let found = format!("{} has no name to change", target.label(scene));
             return Err(EditError::new(found, ""));
         }

@@ -119,7 +119,7 @@ mod tests {
             seen.push(scene.materials["mirror"].roughness);
         }
         assert!(seen.is_sorted_by(|a, b| a < b), "{seen:?}");
-        assert!(seen.contains(&0.32) && seen.contains(&0.001) && seen.contains(&0.05), "{seen:?}");
+        assert!(seen.contains(&0.32) && seen.contains(&0.0125) && seen.contains(&0.05), "{seen:?}");
         for expected in seen.iter().rev().skip(1) {
             scene = step_mirror(&scene, None, "roughness", -1.0).unwrap().scene;
             assert_eq!(scene.materials["mirror"].roughness, *expected);
@@ -131,7 +131,7 @@ mod tests {
             "0 is the end"
         );
         let fine = step_mirror(&scene, None, "roughness", 0.1).unwrap().scene;
-        assert_eq!(fine.materials["mirror"].roughness, 0.001);
+        assert_eq!(fine.materials["mirror"].roughness, 0.01);
     }
 
     #[test]

@@ -36,8 +36,7 @@ pub use mirror_material::{mirror, step_mirror};
 pub use placement::snap_to_ground;
 pub use properties::{Property, Widget, Word, rows};
 pub use ready_made::{
-    add_ready_light, add_ready_object, give_preset, presets, purge_materials, ready_lights,
-    ready_objects,
+    add_ready_made, give_preset, presets, purge_materials, ready_lights, ready_objects,
 };
 pub use rotate::rotate;
 pub use scale::scale;

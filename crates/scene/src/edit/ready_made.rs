@@ -1,7 +1,7 @@
 //! Ready-made parts of scenes: solids of a material, a floor, a framed mirror, lights of a colour.
 
 use crate::edit::add::{
-    ReadyLight, add_light_as, add_object, free_color, plane_height, usual_size,
+    PALETTE, ReadyLight, add_light_as, add_object, free_color, plane_height, usual_size,
 };
 use crate::edit::bounds::pivot_distance;
 use crate::edit::compound::{body, material, set_body};
@@ -39,15 +39,21 @@ const LIGHTS: [ReadyLight; 2] = [
     },
 ];
 
-/// Returns the name and a description of each ready-made object.
-pub fn ready_objects() -> Vec<Word> {
+/// Returns the name and a description of each ready-made object. Of the diffuse ones, the first have a
+/// colour that the scene has not.
+pub fn ready_objects(scene: &Scene) -> Vec<Word> {
     let mut words = vec![
         Word::new(FLOOR, "glossy squares without end, at height 0"),
         Word::new(MIRROR, "slightly rough, behind the objects, facing the camera"),
     ];
     for (body, _) in BODIES {
-        let name = |preset: &str| format!("{preset} {body}");
-        words.extend(Preset::CHOICES.iter().map(|preset| Word::new(name(preset.name), preset.doc)));
+        let word = |word: &str, doc| Word::new(format!("{word} {body}"), doc);
+        let diffuse = Preset::CHOICES[Preset::Diffuse as usize].name;
+        let presets = Preset::CHOICES.iter().filter(|preset| preset.name != diffuse);
+        words.extend(presets.map(|preset| word(preset.name, preset.doc)));
+        let free = PALETTE.iter().position(|(hue, _)| *hue == free_color(scene).0).unwrap_or(0);
+        let hues = PALETTE.iter().cycle().skip(free).take(PALETTE.len());
+        words.extend(hues.map(|(hue, _)| word(hue, "diffuse, matte, without gloss")));
     }
     words
 }
@@ -63,20 +69,14 @@ pub fn presets() -> Vec<Word> {
     Preset::CHOICES.iter().map(|preset| Word::new(preset.name, preset.doc)).collect()
 }
 
-/// Adds a ready-made object: one of [`ready_objects`].
-pub fn add_ready_object(scene: &Scene, name: &str) -> Result<Edit, EditError> {
-    match name {
-        FLOOR => floor(scene),
-        MIRROR => framed_mirror(scene),
+/// Adds one of [`ready_objects`] or [`ready_lights`].
+pub fn add_ready_made(scene: &Scene, name: &str) -> Result<Edit, EditError> {
+    let light = LIGHTS.iter().find(|light| light.name == name);
+    match (name, light) {
+        (FLOOR, _) => floor(scene),
+        (MIRROR, _) => framed_mirror(scene),
+        (_, Some(light)) => add_light_as(scene, light),
         _ => solid(scene, name),
-    }
-}
-
-/// Adds a ready-made light: one of [`ready_lights`].
-pub fn add_ready_light(scene: &Scene, name: &str) -> Result<Edit, EditError> {
-    match LIGHTS.iter().find(|light| light.name == name) {
-        Some(ready) => add_light_as(scene, ready),
-        None => Err(EditError::new(format!("there is no light called \"{name}\""), "")),
     }
 }
 
@@ -123,10 +123,10 @@ fn material_of(scene: &mut Scene, preset: Preset, color: Option<Color>) -> Strin
     let word = Preset::CHOICES[preset as usize].name;
     let mut name = word.to_string();
     if matches!(preset, Preset::Plastic | Preset::Diffuse) {
-        let (hue, free) = free_color(scene);
-        material.color = color.unwrap_or(free);
-        if color.is_none() {
-            name = if preset == Preset::Diffuse { hue.into() } else { format!("{hue} {word}") };
+        material.color = color.unwrap_or(free_color(scene).1);
+        if let Some((hue, _)) = PALETTE.iter().find(|(_, known)| *known == material.color.0) {
+            let is_plain = preset == Preset::Diffuse;
+            name = if is_plain { hue.to_string() } else { format!("{hue} {word}") };
         }
     }
     let known = scene.materials.iter().find(|(_, known)| **known == material);
@@ -137,16 +137,16 @@ fn material_of(scene: &mut Scene, preset: Preset, color: Option<Color>) -> Strin
     })
 }
 
-/// Adds a solid whose `name` has a preset and one of [`BODIES`].
+/// Adds a solid whose `name` has a preset, or the colour of a diffuse one, and one of [`BODIES`].
 fn solid(scene: &Scene, name: &str) -> Result<Edit, EditError> {
     let (word, body) = name.rsplit_once(' ').unwrap_or((name, ""));
-    let preset = preset(word)?;
+    let color = PALETTE.iter().find(|(hue, _)| *hue == word).map(|(_, color)| Color(*color));
+    let preset = if color.is_some() { Preset::Diffuse } else { preset(word)? };
     let kind = BODIES.iter().find(|(known, _)| *known == body).map_or(body, |(_, kind)| *kind);
     let mut with_material = scene.clone();
-    let material = material_of(&mut with_material, preset, None);
-    let called = if preset == Preset::Diffuse { format!("{material} {body}") } else { name.into() };
+    let material = material_of(&mut with_material, preset, color);
     let mut edit = add_object(&with_material, kind, Some(&material))?;
-    let name = free_object(scene, &called);
+    let name = free_object(scene, name);
     edit.scene
         .objects
         .iter_mut()
@@ -266,10 +266,9 @@ mod tests {
     #[test]
     fn ready_made_objects_fit_the_view_and_each_other() {
         let mut scene = empty();
-        for name in
-            ["gold ball", "checker floor", "glass ball", MIRROR, "diffuse ball", "rubber cone"]
+        for name in ["gold ball", "checker floor", "glass ball", MIRROR, "red ball", "rubber cone"]
         {
-            scene = add_ready_object(&scene, name).unwrap_or_else(|e| panic!("{name}: {e}")).scene;
+            scene = add_ready_made(&scene, name).unwrap_or_else(|e| panic!("{name}: {e}")).scene;
         }
         let names: Vec<_> = scene.objects.iter().map(|object| object.name.as_str()).collect();
         let expected = [
@@ -294,9 +293,9 @@ mod tests {
             }
         }
         assert_eq!(scene.materials["red"].color, Color([0.85, 0.16, 0.11]));
-        let again = add_ready_object(&scene, "gold cube").unwrap().scene;
+        let again = add_ready_made(&scene, "gold cube").unwrap().scene;
         assert_eq!(again.materials.len(), scene.materials.len(), "gold is there");
-        assert!(add_ready_object(&scene, "paper ball").is_err());
+        assert!(add_ready_made(&scene, "paper ball").is_err());
     }
 
     #[test]
@@ -304,7 +303,7 @@ mod tests {
         for eye in [[4.0, 1.5, 3.0], [-300.0, 90.0, 10.0], [0.02, 0.01, -0.04]] {
             let mut scene = empty();
             scene.camera.eye = eye;
-            let scene = add_ready_object(&scene, MIRROR).unwrap().scene;
+            let scene = add_ready_made(&scene, MIRROR).unwrap().scene;
             let Shape::Rectangle(mirror) = &scene.objects[1].shape else { panic!() };
             let to_eye = (DVec3::from(eye) - DVec3::from(mirror.center)).with_y(0.0);
             let along = DVec3::from(mirror.normal).dot(to_eye.normalize());
@@ -314,12 +313,12 @@ mod tests {
 
     #[test]
     fn presets_are_given_to_one_object_and_unused_materials_removed() {
-        let scene = add_ready_object(&empty(), "diffuse ball").unwrap().scene;
+        let scene = add_ready_made(&empty(), "red ball").unwrap().scene;
         let ball = Target::Object(0);
         let gold = give_preset(&scene, &ball, "gold").unwrap();
         assert_eq!(gold.scene.objects[0].material, "gold");
         let plastic = give_preset(&scene, &ball, "plastic").unwrap().scene;
-        assert_eq!(plastic.materials["plastic"].color, scene.materials["red"].color);
+        assert_eq!(plastic.materials["red plastic"].color, scene.materials["red"].color);
         assert!(give_preset(&scene, &Target::Camera, "gold").is_err());
         let purged = purge_materials(&gold.scene).unwrap().scene;
         assert_eq!(purged.materials.keys().collect::<Vec<_>>(), ["gold"]);

@@ -132,8 +132,11 @@ impl Target {
                 named(object.map(|o| &o.name)).unwrap_or_else(|| format!("{kind} {}", i + 1))
             }
             Self::Part(i, path) => {
-                let kind = operand(scene, *i, path).map_or("part", |part| part.shape.key());
-                format!("{kind} {}", path.last().map_or(0, |i| i + 1))
+                let part = operand(scene, *i, path);
+                let kind = part.map_or("part", |part| part.shape.key());
+                let number = path.last().map_or(0, |i| i + 1);
+                named(part.map(|part| &part.name))
+                    .unwrap_or_else(|| format!("{} {number}", kind.replace('_', " ")))
             }
             // These targets are tables, named by their key.
             Self::Camera | Self::Settings(_) => self.path().concat(),

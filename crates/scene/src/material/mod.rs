@@ -63,12 +63,12 @@ description! {
         /// Tangent of the half-angle of the cone of reflected and of transmitted rays, not a
         /// microfacet alpha; 0 is a perfect mirror and clear glass.
         // The blur of roughness 0.001 is just visible at the far end of a room.
-        roughness: f64 = 0.0, in closed(0.0, 1e6), step Rungs(0.001);
+        roughness: f64 = 0.0, in closed(0.0, 1e6), step Rungs(0.01);
         /// Distribution of reflected and transmitted rays. The same roughness gives a comparable
         /// blur with each.
         lobe: Lobe = "cone";
         /// Roughness parameter alpha of the microfacet distribution.
-        alpha: Option<f64>, or "roughness / (2 √2)", in closed(0.0, 1e6), step Rungs(0.001);
+        alpha: Option<f64>, or "roughness / (2 √2)", in closed(0.0, 1e6), step Rungs(0.005);
         /// Model of masking and shadowing between microfacets.
         masking: Masking = "v-cavity";
         /// Dependence of the reflectance on the angle.

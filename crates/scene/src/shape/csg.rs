@@ -15,6 +15,8 @@ pub const MAX_DEPTH: usize = 64;
 description! {
     /// Part of a compound: a solid with its own material and transform.
     pub struct CsgOperand {
+        /// Name of the part, such as `foot`.
+        name: String, or "a number";
         /// Shape of the part: a solid, or a plane for the half-space behind it.
         shape: Shape;
         /// Name of one of the `[materials.NAME]`.
@@ -37,7 +39,7 @@ macro_rules! compounds {
         description! {
             #[doc = $doc]
             pub struct $kind {
-                /// Two parts or more, each written like an object: `shape`, `material`, `transform`.
+                /// Two parts or more, each written like an object: `name`, `shape`, `material`, `transform`.
                 of: Vec<CsgOperand>;
                 example $example;
             }
@@ -111,7 +113,7 @@ fn fitted_parts(base: DVec3, size: DVec3) -> [Shape; 2] {
 impl CsgOperand {
     /// Creates a part of a compound without a transform, with the material of the whole.
     pub fn new(shape: Shape) -> Self {
-        Self { shape, material: String::new(), transform: Vec::new() }
+        Self { name: String::new(), shape, material: String::new(), transform: Vec::new() }
     }
 }
 

@@ -33,6 +33,8 @@ pub struct Exporter {
     pub file: Option<SharedFile>,
     /// Kind of random numbers that the metadata name.
     pub sampler: SamplerKind,
+    /// Size of the film in the scene file if the pictures have another.
+    pub film_size: Option<[u32; 2]>,
 }
 
 impl Exporter {
@@ -63,6 +65,9 @@ impl Exporter {
 
     /// Returns the metadata on the origin of a picture of `scene`.
     pub fn provenance(&self, scene: &Scene) -> Provenance {
+        let mut scene = scene.clone();
+        scene.film.size = self.film_size.unwrap_or(scene.film.size);
+        let scene = &scene;
         let (source, text) = match self.file.as_ref().and_then(SharedFile::get) {
             // The text that saving the scene would write to its file.
             Some(file) => (file.document.name.clone(), file.text_of(scene)),
@@ -162,14 +167,17 @@ fn finish(
     [finished, cancelled]: [&AtomicBool; 2],
     report_progress: impl Fn(Option<(f64, Option<Interval>)>),
 ) -> Option<Result<Exported, String>> {
+    let mut is_complete = false;
     loop {
         if cancelled.load(Ordering::Relaxed) {
             return None;
         }
-        if finished.load(Ordering::Relaxed) {
+        if finished.load(Ordering::Relaxed) && is_complete {
             break;
         }
         let Some(snapshot) = session.wait(POLL_INTERVAL) else { continue };
+        // Before, some pixels have no samples of both replicates.
+        is_complete = snapshot.report.noise.is_some();
         match snapshot.report.state {
             State::Finished(_) => break,
             State::Failed(why) => return Some(Err(why)),

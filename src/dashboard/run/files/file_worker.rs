@@ -28,6 +28,8 @@ pub enum Job {
     Open(SceneSource),
     /// List the scenes that can be opened.
     List,
+    /// List the paths that begin with this text: if `true`, relative to the folder of the scene file.
+    Complete(String, bool),
     /// Continue with this text, recovered for an unreadable scene file.
     Adopt(Box<SceneFile>),
     End,
@@ -72,6 +74,12 @@ impl FileWorker {
                 Ok(Job::List) => {
                     let folder = self.path.as_deref().and_then(Path::parent);
                     self.send(Message::Scenes(scene_list::names(folder, self.state.as_deref())));
+                }
+                Ok(Job::Complete(text, beside_scene)) => {
+                    let folder = self.path.as_deref().and_then(Path::parent);
+                    let folder = folder.filter(|_| beside_scene).unwrap_or(Path::new(""));
+                    let paths = scene_list::paths(folder, &text);
+                    self.send(Message::Paths(text, paths));
                 }
                 Ok(Job::Adopt(file)) => self.file = Some(*file),
                 Err(RecvTimeoutError::Timeout) => {}

@@ -52,3 +52,37 @@ pub fn remember(path: &Path, state: &Path) {
 fn list(state: &Path) -> PathBuf {
     state.join("recent")
 }
+
+/// Returns the paths in `folder` that begin with `text`, in order. Those of folders end with a slash.
+pub fn paths(folder: &Path, text: &str) -> Vec<String> {
+    let (parent, begun) = text.split_at(text.rfind('/').map_or(0, |slash| slash + 1));
+    let place = Path::new(".").join(folder).join(parent);
+    let entries = fs::read_dir(place).into_iter().flatten().flatten();
+    let named = entries.filter_map(|entry| {
+        let name = entry.file_name().into_string().ok()?;
+        let is_wanted = name.starts_with(begun) && name.starts_with('.') == begun.starts_with('.');
+        let slash = if entry.path().is_dir() { "/" } else { "" };
+        is_wanted.then(|| format!("{parent}{name}{slash}"))
+    });
+    let mut paths: Vec<_> = named.collect();
+    paths.sort();
+    paths
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_begin_with_the_typed_text() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("meshes")).unwrap();
+        for name in ["meshes/duck.obj", "meshes/dune.obj", "meshes/.duck", "mesh.obj"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        let paths = |text| paths(folder.path(), text).join(" ");
+        assert_eq!(paths("me"), "mesh.obj meshes/");
+        assert_eq!(paths("meshes/du"), "meshes/duck.obj meshes/dune.obj");
+        assert_eq!([paths("nowhere/d"), paths("x")], ["", ""]);
+    }
+}

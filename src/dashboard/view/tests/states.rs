@@ -141,7 +141,13 @@ fn prompt(model: &mut Model, words: [&str; 3], problem: Option<&str>) {
     let [title, help, text] = words.map(str::to_string);
     let mut editor = Editor::new(text);
     editor.problem = problem.map(str::to_string);
-    model.overlay = Some(Overlay::Prompt(Prompt { title, help, editor, apply: |_, _| Ok(()) }));
+    model.overlay = Some(Overlay::Prompt(Prompt {
+        title,
+        help,
+        editor,
+        takes_path: false,
+        apply: |_, _| Ok(()),
+    }));
 }
 
 fn probing(model: &mut Model) {
