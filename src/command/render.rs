@@ -34,7 +34,7 @@ const DEFAULT_NOISE_LEVELS: f64 = 0.5;
 /// Interval at which signals and progress are polled.
 const POLL: Duration = Duration::from_millis(50);
 /// Time after a signal in which the first picture may still be completed.
-const FIRST_PICTURE: Duration = Duration::from_millis(300);
+const FIRST_PICTURE: Duration = Duration::from_millis(150);
 
 /// Renders the scenes one after another. A scene that fails does not keep the others from being
 /// rendered.

@@ -20,7 +20,7 @@ use zerkalo_render::session::{Picture, Session};
 use zerkalo_scene::{Scene, SceneFile};
 use zerkalo_terminal::{INTERRUPTED, SignalEvent};
 
-/// Time after which the user is told that a picture is still being written at the end.
+/// Time after which a message says that a picture is still being written at the end.
 const NOTICED_AFTER: Duration = Duration::from_millis(400);
 
 /// Executor of effects: the session, the threads of the scene file, and the exports.
@@ -208,18 +208,17 @@ impl EffectRunner {
     /// # Errors
     /// Fails with the reason if unsaved edits are lost.
     pub fn finish(
-        self,
+        &mut self,
         deadline: Option<Instant>,
         signals: &Receiver<SignalEvent>,
     ) -> Result<Option<PathBuf>, String> {
-        let Self { session, editing, exporting, .. } = self;
-        let (kept, resized) = match editing {
-            Some(mut editing) => (editing.files.finish(), editing.resized),
-            None => (Ok(None), None),
-        };
+        let editing = self.editing.as_mut();
+        let (kept, resized) = editing.map_or((Ok(None), None), |editing| {
+            (editing.files.finish(), editing.resized.take())
+        });
         // The session runs exports in the order of their requests, so that waiting for the last one
         // suffices. A panic of its thread drops the sender, too.
-        let writing = exporting.into_iter().chain(resized.and_then(ResizedExport::end));
+        let writing = self.exporting.take().into_iter().chain(resized.and_then(ResizedExport::end));
         for written in writing {
             let noticed = after(NOTICED_AFTER);
             let ended = deadline.map_or(never(), crossbeam_channel::at);
@@ -238,8 +237,6 @@ impl EffectRunner {
                 }
             }
         }
-        // The process ends without the time to free large films.
-        std::mem::forget(session);
         kept
     }
 }

@@ -29,7 +29,7 @@ impl OpenTerminal {
     }
 }
 
-/// What is being loaded, for the messages on the terminal.
+/// Name of the scene or films being loaded, and messages, for the terminal.
 pub struct Loading {
     pub name: String,
     /// Messages about large files.

@@ -237,8 +237,8 @@ fn end(
     if let Some(path) = trace {
         dashboard.latency.write(&path)?;
     }
-    // The process ends without the time to free large scenes and pictures.
-    std::mem::forget((dashboard.model, dashboard.frames));
+    // The process ends without the time to free large scenes and films.
+    std::mem::forget(dashboard);
     Ok(ended)
 }
 
