@@ -1,12 +1,12 @@
 //! `zerkalo [SCENE]`: the dashboard.
 
 use crate::command::args::EditArgs;
-use crate::command::load_progress::LoadReporter;
-use crate::command::{Failure, is_quiet, print_error, scenes, warn, write_line};
+use crate::command::{Failure, is_quiet, load_progress, print_error, scenes, warn, write_line};
 use crate::dashboard::message::Exported;
 use crate::dashboard::preferences::Preferences;
-use crate::dashboard::run::{Ended, FaultyFile, Setup, run as run_dashboard};
+use crate::dashboard::run::{Ended, FaultyFile, Loading, Setup, run as run_dashboard};
 use crate::dashboard::scene_source::SceneSource;
+use crossbeam_channel::unbounded;
 use std::env;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
@@ -29,11 +29,23 @@ pub fn run(args: &EditArgs, preferences: Preferences) -> Result<(), Failure> {
     let environment = terminal_environment(&format!(
         "`zerkalo render {scene} -o PICTURE.png` renders without one"
     ))?;
-    let reporter = LoadReporter::new();
+    let (stage, stages) = unbounded();
+    let assets = load_progress::reporting(move |text| drop(stage.send(text)));
+    let terminal = args.terminal.setup(environment, preferences);
+    let args = args.clone();
+    let ended = run_dashboard(
+        Loading { name: scene.into_owned(), stages },
+        move || setup(&args, assets),
+        terminal,
+    )?;
+    conclude(&ended, io::stdout().lock())
+}
+
+/// Reads the scene or the checkpoint of `args`.
+fn setup(args: &EditArgs, assets: Arc<Assets>) -> Result<Setup, Failure> {
     let state = state_folder(|name| env::var_os(name));
     let film = args.scene.as_deref().filter(|path| is_film_file(path));
     let checkpoint = film.map(Checkpoint::read).transpose()?;
-    let assets = reporter.assets.clone();
     let file = match (&checkpoint, &args.scene) {
         (Some(checkpoint), _) => Ok(scene_of(checkpoint, assets)?),
         (None, Some(path)) => scenes::source(path)?
@@ -46,7 +58,6 @@ pub fn run(args: &EditArgs, preferences: Preferences) -> Result<(), Failure> {
     {
         return Err(Failure::Failed(errors.to_string() + &orphaned_edits(path, state.as_deref())));
     }
-    reporter.mute();
     // A continued render keeps its seed, sampler and precision.
     let (sampling, precision) = match &checkpoint {
         Some(checkpoint) => (checkpoint.sampling(), checkpoint.header.film.precision),
@@ -58,16 +69,14 @@ pub fn run(args: &EditArgs, preferences: Preferences) -> Result<(), Failure> {
     let tone =
         file.as_ref().map_or_else(|_| Tone::default(), |file| file.document.scene().film.tone);
     let display = Display { tone, ..Display::default() };
-    let setup = Setup {
+    Ok(Setup {
         file,
         checkpoint,
         state,
         threads: args.compute.threads(),
         options: Options::new(precision, sampling, display),
-        terminal: args.terminal.setup(environment, preferences),
         trace: args.trace.clone(),
-    };
-    conclude(&run_dashboard(setup)?, io::stdout().lock())
+    })
 }
 
 /// Returns the reason why `path` names no scene, and what to do; `None` if it may name one.

@@ -35,7 +35,6 @@ use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches};
 use config::Config;
-use load_progress::LoadReporter;
 use serde::Serialize;
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -44,6 +43,7 @@ use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use zerkalo_scene::value::{nearest, sanitized};
@@ -179,8 +179,17 @@ fn end(error: &clap::Error) -> ! {
 /// have no effect, because batch systems send a signal twice or every few seconds. Only a second
 /// Ctrl-C in a terminal ends the program at once.
 fn handle_signals() -> Result<Signals, Failure> {
+    cancel_on_signals(Arc::default())
+}
+
+/// Handles signals as [`handle_signals`] does, and sets `cancel` on the first.
+fn cancel_on_signals(cancel: Arc<AtomicBool>) -> Result<Signals, Failure> {
     let mut first = None;
     on_signal(move |status| {
+        cancel.store(true, Ordering::Release);
+        if IS_INTERRUPTIBLE.load(Ordering::Acquire) {
+            std::process::exit(status.into());
+        }
         let is_key = status == INTERRUPTED && is_in_foreground();
         let first = first.get_or_insert_with(Instant::now);
         if is_key && first.elapsed() >= SECOND_KEY {
@@ -248,6 +257,17 @@ fn checked_stdout(written: io::Result<()>) -> Result<(), Failure> {
     }
 }
 
+/// `true` while there is nothing to save: signals end the program at once.
+static IS_INTERRUPTIBLE: AtomicBool = AtomicBool::new(false);
+
+/// Runs `load`, during which signals end the program at once.
+fn interruptible<T>(load: impl FnOnce() -> T) -> T {
+    IS_INTERRUPTIBLE.store(true, Ordering::Release);
+    let loaded = load();
+    IS_INTERRUPTIBLE.store(false, Ordering::Release);
+    loaded
+}
+
 /// Path that stands for stdin or stdout.
 const STREAM: &str = "-";
 
@@ -263,9 +283,9 @@ fn scene_or_errors(path: &Path) -> Result<Result<Document, SceneErrors>, Failure
         let (name, text) = BUILT_IN[index];
         return Ok(Document::parse(text.to_string(), &format!("{name}.toml")));
     }
-    let assets = LoadReporter::new().assets;
+    let assets = load_progress::reporting_on_stderr();
     if path != Path::new(STREAM) {
-        return Ok(Document::read(path, assets));
+        return Ok(interruptible(|| Document::read(path, assets)));
     }
     if io::stdin().is_terminal() {
         let message = "the scene - comes from a pipe or a file, and stdin is a terminal";

@@ -6,12 +6,13 @@ use crate::command::deadline::Deadline;
 use crate::command::progress::{Progress, counts, noise};
 use crate::command::regions::Division;
 use crate::command::{
-    Failure, STREAM, checked_stdout, handle_signals, print_error, print_line, read_scene, save,
-    shard, stats, warn, warn_of_precision,
+    Failure, STREAM, checked_stdout, handle_signals, interruptible, print_error, print_line,
+    read_scene, save, shard, stats, warn, warn_of_precision,
 };
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, IsTerminal};
+use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -33,7 +34,7 @@ const DEFAULT_NOISE_LEVELS: f64 = 0.5;
 /// Interval at which signals and progress are polled.
 const POLL: Duration = Duration::from_millis(50);
 /// Time after a signal in which the first picture may still be completed.
-const FIRST_PICTURE: Duration = Duration::from_millis(400);
+const FIRST_PICTURE: Duration = Duration::from_millis(150);
 
 /// Renders the scenes one after another. A scene that fails does not keep the others from being
 /// rendered.
@@ -232,7 +233,9 @@ fn as_a_whole(
 ) -> Result<Rendered, Failure> {
     let Job { args, scene, options, output, provenance, signals, started } = job;
     let threads = args.compute.threads();
-    let mut session = Session::new(threads, options, schedule_settings(args, output))?;
+    let session = Session::new(threads, options, schedule_settings(args, output))?;
+    // The process usually ends without the time to free a large film.
+    let mut session = ManuallyDrop::new(session);
     match checkpoint {
         Some(checkpoint) => resume(&mut session, Arc::new(scene), checkpoint),
         None => drop(session.set_scene(Arc::new(scene))),
@@ -264,6 +267,9 @@ fn as_a_whole(
     });
     let (report, precision, biased) = results?.ok_or("the renderer has no picture")?;
     let write_seconds = writing.elapsed().as_secs_f64();
+    if end.is_ok() && !args.more.is_empty() {
+        drop(ManuallyDrop::into_inner(session));
+    }
     Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept })
 }
 
@@ -280,7 +286,8 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     };
     let (scene, settings) = (Arc::new(scene), schedule_settings(args, output));
     let threads = args.compute.threads();
-    let mut render = RegionRender::new(&scene, &options, settings, rows, threads)?;
+    let new = || RegionRender::new(&scene, &options, settings, rows, threads);
+    let mut render = interruptible(new)?;
     let results = render.write(&provenance, args.bits, output, &mut observe);
     let results = results.map(|(report, stopped_by)| {
         let world = &render.state().world;

@@ -31,8 +31,8 @@ const POINT_RATIO: f64 = 0.84;
 
 /// Renders with the settings of `variant`. Ends when the error is at most `levels` 8-bit levels,
 /// `seconds` of tracing have passed, or further samples cannot change the picture. For biased
-/// settings, whose true error does not converge to 0, the error is the estimated one. Also ends when
-/// `goes_on`, which is called after each step, returns `false`. Returns the error curve and the
+/// settings, whose true error does not converge to 0, the error is the estimated one. Also ends,
+/// without a last point, when `goes_on`, which is called after each step, returns `false`. Returns the error curve and the
 /// render. Fails if a thread cannot be started.
 pub fn follow(
     variant: &Variant,
@@ -47,7 +47,10 @@ pub fn follow(
     for step in 1.. {
         let done = render.step().is_some();
         let estimate = render.noise_levels();
-        let timed_out = render.seconds >= seconds || !goes_on();
+        if !goes_on() {
+            break;
+        }
+        let timed_out = render.seconds >= seconds;
         let changed = estimate.is_some_and(|t| t <= POINT_RATIO * last_estimate);
         // Further samples do not change a picture without noise.
         let noiseless = estimate == Some(0.0);
@@ -86,11 +89,11 @@ pub fn repeat(
     let mut step = 0;
     for point in points {
         while step < point.step {
+            render.step();
+            step += 1;
             if !goes_on() {
                 return Ok(());
             }
-            render.step();
-            step += 1;
         }
         point.seconds.push(render.seconds);
     }

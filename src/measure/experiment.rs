@@ -2,6 +2,7 @@
 
 use std::io;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::film::Display;
 use zerkalo_render::schedule::{Settings, Stop};
@@ -149,6 +150,8 @@ pub struct Variant {
     pub options: Options,
     pub adaptive: bool,
     pub threads: usize,
+    /// Request to end the render.
+    pub cancel: Arc<AtomicBool>,
 }
 
 impl Variant {
@@ -156,7 +159,9 @@ impl Variant {
     /// number of samples. Fails if a thread cannot be started.
     pub fn start(&self) -> io::Result<SyncRender> {
         let settings = Settings { adaptive: self.adaptive, ..Settings::until(Stop::default()) };
-        SyncRender::new(&self.scene, &self.options, settings, self.threads)
+        let mut render = SyncRender::new(&self.scene, &self.options, settings, self.threads)?;
+        render.cancel = Arc::clone(&self.cancel);
+        Ok(render)
     }
 
     /// Returns a copy with the name `name` to which `change` is applied.
@@ -185,6 +190,8 @@ pub struct Plan {
     pub threads: usize,
     pub seed: u64,
     pub display: Display,
+    /// Request to end the measurement with the results so far.
+    pub cancel: Arc<AtomicBool>,
 }
 
 impl Plan {
@@ -199,6 +206,7 @@ impl Plan {
             options: Options::new(Precision::Auto, sampling, self.display),
             adaptive: true,
             threads: self.threads,
+            cancel: Arc::clone(&self.cancel),
         };
         let mut all = vec![base.clone()];
         for experiment in self.experiments.iter().copied() {

@@ -129,6 +129,9 @@ impl Course<'_> {
             let (points, render) = follow(&variant, reference, levels, longest, &mut || {
                 self.goes_on(&variant.name, 1 + i)
             })?;
+            if points.is_empty() {
+                break;
+            }
             let bias = || reference.bias(&render.state.film, &render.state.weights);
             let bias = (!variant.experiment.is_unbiased).then(bias);
             let result = Measured { variant, points, bias };

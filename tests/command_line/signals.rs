@@ -3,8 +3,12 @@
 use super::*;
 use crate::command_line::shards::set_samples;
 use crate::harness::*;
+use signal_hook::consts::{SIGINT, SIGQUIT};
+use signal_hook::flag::register_conditional_default;
 use std::io::{BufRead, BufReader};
 use std::process::Child;
+use std::sync::Once;
+use std::sync::atomic::AtomicBool;
 
 pub fn signal(name: &str, id: u32) {
     let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
@@ -49,7 +53,16 @@ pub fn wait_for_file(path: &Path) {
 /// Starts the program and waits until it handles SIGTERM and SIGINT: until it has threads that
 /// trace, which it starts after its handlers are complete. The system already reports a signal as
 /// caught (`SigCgt`) a moment before the handler knows what to do, and a signal is lost then.
+///
+/// SIGINT and SIGQUIT have their default in the program, even if the tests run in the background of a
+/// script, which ignores them: handled signals are not inherited.
 pub(super) fn spawn(desk: &Desk, args: &[&str]) -> Child {
+    static HANDLERS: Once = Once::new();
+    HANDLERS.call_once(|| {
+        for signal in [SIGINT, SIGQUIT] {
+            register_conditional_default(signal, Arc::new(AtomicBool::new(true))).unwrap();
+        }
+    });
     let mut command = desk.command(args);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_for_status(child.id(), "Threads:", 10, |threads| threads > 1);

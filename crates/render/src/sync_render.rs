@@ -5,7 +5,7 @@ use crate::schedule::{Schedule, Settings, Step, StoppedBy};
 use crate::{ErrorParts, Options, RenderState, threads};
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use zerkalo_scene::Scene;
 
@@ -15,6 +15,8 @@ pub struct SyncRender {
     pub schedule: Schedule,
     /// Seconds of tracing, without compilation.
     pub seconds: f64,
+    /// Request to end [`SyncRender::step`] at once.
+    pub cancel: Arc<AtomicBool>,
     pool: rayon::ThreadPool,
 }
 
@@ -32,7 +34,7 @@ impl SyncRender {
             RenderState::new(&Arc::new(scene.clone()), options, None).map_err(io::Error::other)?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
         let schedule = state.schedule(settings);
-        Ok(Self { state, schedule, pool, seconds: 0.0 })
+        Ok(Self { state, schedule, pool, seconds: 0.0, cancel: Arc::default() })
     }
 
     /// Traces the next round. Returns the stop criterion that ended the render, or `None` if it
@@ -44,15 +46,14 @@ impl SyncRender {
                 Step::Trace(wave) => wave,
             };
             let start = Instant::now();
-            let report = self.state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
+            let report = self.state.trace_wave(&wave, &self.pool, &self.cancel);
             self.seconds += start.elapsed().as_secs_f64();
             self.schedule.complete(&wave, &report);
             if let Some(packets) = self.schedule.due_probe() {
-                let never = AtomicBool::new(false);
-                let sums = self.state.probe_errors(packets, &self.pool, &never);
+                let sums = self.state.probe_errors(packets, &self.pool, &self.cancel);
                 sums.iter().for_each(|sums| self.schedule.record_probe(sums));
             }
-            if wave.replicate == 1 {
+            if wave.replicate == 1 || self.cancel.load(Ordering::Relaxed) {
                 return None;
             }
         }

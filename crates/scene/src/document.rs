@@ -102,6 +102,11 @@ impl Document {
         &self.scene
     }
 
+    /// Returns the scene that the text describes, shared with this document.
+    pub fn shared_scene(&self) -> Arc<Scene> {
+        Arc::clone(&self.scene)
+    }
+
     /// Returns the scene that the text describes. It is copied only if the document has a clone.
     pub fn into_scene(self) -> Scene {
         drop(self.origin);

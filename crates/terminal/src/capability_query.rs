@@ -58,8 +58,8 @@ pub fn status_request(through: Option<Multiplexer>) -> &'static str {
 }
 
 /// Queries the capabilities, in about one round trip, or two inside a multiplexer over SSH. Keys
-/// that are pressed during the query are kept in `input`. `is_ending` returns `true` if the query
-/// should stop.
+/// that are pressed during the query are kept in `input`. `is_ending` returns `true` for events after
+/// which the query should stop.
 ///
 /// Inside a local tmux, the query does not wait for the terminal outside tmux, which may never
 /// reply. The caller passes a late reply to [`Capabilities::learn`].
@@ -70,7 +70,7 @@ pub fn query_capabilities(
     tty: &Tty,
     input: &mut InputReader,
     environment: Environment,
-    is_ending: &dyn Fn() -> bool,
+    is_ending: &dyn Fn(&[TimedEvent]) -> bool,
 ) -> io::Result<Capabilities> {
     let patience = if environment.ssh.is_some() { PATIENCE_OVER_SSH } else { PATIENCE };
     let mut capabilities = Capabilities::from_environment(environment);
@@ -105,7 +105,7 @@ pub fn query_passthrough(
     tty: &Tty,
     input: &mut InputReader,
     capabilities: &mut Capabilities,
-    is_ending: &dyn Fn() -> bool,
+    is_ending: &dyn Fn(&[TimedEvent]) -> bool,
 ) -> io::Result<()> {
     let Some(multiplexer) = capabilities.environment.multiplexer else { return Ok(()) };
     let sent_at = Instant::now();
@@ -121,16 +121,16 @@ pub fn query_passthrough(
 }
 
 /// Passes replies and their times to `take` until it returns `true`, `deadline` has come, or
-/// `is_ending` returns `true`. Other events are kept in `input`.
+/// `is_ending` returns `true` for the other events, which are kept in `input`.
 fn listen(
     input: &mut InputReader,
     deadline: Instant,
-    is_ending: &dyn Fn() -> bool,
+    is_ending: &dyn Fn(&[TimedEvent]) -> bool,
     mut take: impl FnMut(Instant, &Reply) -> bool,
 ) -> io::Result<()> {
     let mut others = Vec::new();
     let mut done = false;
-    while !done && !is_ending() && Instant::now() < deadline {
+    while !done && !is_ending(&others) && Instant::now() < deadline {
         let events = input.wait(Some(deadline.min(Instant::now() + CHECK_INTERVAL)))?;
         for TimedEvent { at, event } in events {
             match event {

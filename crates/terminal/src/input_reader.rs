@@ -26,8 +26,9 @@ pub struct InputReader {
     /// Time from which the rest of a sequence is awaited. A single byte, which may be a key, does
     /// not extend the wait.
     waits_since: Instant,
-    /// Events that were read during the capability query, for the next [`InputReader::wait`].
-    pub(super) early: Vec<TimedEvent>,
+    /// Events that were read early, as during the capability query, for the next
+    /// [`InputReader::wait`].
+    pub early: Vec<TimedEvent>,
 }
 
 impl InputReader {

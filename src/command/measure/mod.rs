@@ -5,11 +5,14 @@ mod table;
 
 use crate::command::args::MeasureArgs;
 use crate::command::progress::style;
-use crate::command::{Failure, handle_signals, print_line, read_scene_and_warn};
+use crate::command::{
+    Failure, IS_INTERRUPTIBLE, cancel_on_signals, print_line, read_scene_and_warn,
+};
 use crate::measure::{self, EXPERIMENTS, Plan, Reference};
 use indicatif::ProgressBar;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use zerkalo_render::film::Display;
 use zerkalo_render::image_file;
 use zerkalo_scene::disk::{self, check_writable};
@@ -30,15 +33,19 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let reference = reference.map(|path| given_reference(path, scene.film.size, &display));
     let reference = reference.transpose()?;
     let plan = plan(args, display);
-    let signals = handle_signals()?;
+    let signals = cancel_on_signals(Arc::clone(&plan.cancel))?;
+    IS_INTERRUPTIBLE.store(true, Ordering::Release);
     let bar = ProgressBar::new(1).with_style(style("measuring {bar:30} {msg}"));
     let measurement =
         measure::measure(&Arc::new(scene), &plan, reference, &mut |step, done, total| {
             bar.set_length(total as u64);
             bar.set_position(done as u64);
             bar.set_message(step.to_string());
+            // There are no results before the curve of the default settings, the second step.
+            IS_INTERRUPTIBLE.store(done < 2, Ordering::Release);
             signals.caught().is_none()
         })?;
+    IS_INTERRUPTIBLE.store(false, Ordering::Release);
     bar.finish_and_clear();
 
     let report = table::MeasureReport { scene: &args.scene, measurement: &measurement };
@@ -78,6 +85,7 @@ fn plan(args: &MeasureArgs, display: Display) -> Plan {
         threads: args.compute.threads(),
         seed: args.compute.seed,
         display,
+        cancel: Arc::default(),
     }
 }
 

@@ -30,9 +30,9 @@ pub fn diagnose(environment: Environment) -> io::Result<TerminalReport> {
     let tty = screen.tty.clone();
     handle_signals(signals, screen.tty.clone(), Duration::ZERO)?;
     let mut input = InputReader::new(&environment);
-    let mut terminal = query_capabilities(&tty, &mut input, environment, &|| false)?;
+    let mut terminal = query_capabilities(&tty, &mut input, environment, &|_| false)?;
     if terminal.passthrough.is_none() {
-        query_passthrough(&tty, &mut input, &mut terminal, &|| false)?;
+        query_passthrough(&tty, &mut input, &mut terminal, &|_| false)?;
     }
     let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
     let mode = InitialLink::of(&terminal, queue.is_some(), None).mode;

@@ -5,9 +5,8 @@ use crate::dashboard::run::DEFAULT_STOP;
 use crate::dashboard::run::exports::{Exporter, ResizedExport, image_viewer, paths};
 use crate::dashboard::run::files::{AutosaveJob, Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
-use crate::dashboard::run::worker::Worker;
 use crate::dashboard::{Effect, Exported, Format, Message};
-use crossbeam_channel::{Receiver, Sender, bounded};
+use crossbeam_channel::{Receiver, Sender, TryRecvError, after, bounded, never, select};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,6 +18,10 @@ use zerkalo_render::plan::FilmFiles;
 use zerkalo_render::schedule::{Settings, Stop};
 use zerkalo_render::session::{Picture, Session};
 use zerkalo_scene::{Scene, SceneFile};
+use zerkalo_terminal::{INTERRUPTED, SignalEvent};
+
+/// Time after which a message says that a picture is still being written at the end.
+const NOTICED_AFTER: Duration = Duration::from_millis(400);
 
 /// Executor of effects: the session, the threads of the scene file, and the exports.
 pub struct EffectRunner {
@@ -200,40 +203,48 @@ impl EffectRunner {
 
     /// Ends the session without waiting, unless it may have pictures to write.
     pub fn stop_early(&self) {
-        if self.exporting.is_none() {
+        let is_over =
+            |running: &Receiver<()>| running.try_recv() == Err(TryRecvError::Disconnected);
+        if self.exporting.as_ref().is_none_or(is_over) {
             self.session.stop();
         }
     }
 
-    /// Completes pending writes and ends the threads. Waits until `deadline` for the session and
-    /// for pictures that are being written, or without limit if `deadline` is `None`. Returns the
-    /// path of the recovery file, or `None` if there are no unsaved edits.
+    /// Completes pending writes. Waits for pictures that are being written until `deadline`. If that
+    /// is `None`, because the user quits, waits until Ctrl-C is among `signals`.
+    /// Returns the path of the recovery file, or `None` if there are no unsaved edits.
     ///
     /// # Errors
     /// Fails with the reason if unsaved edits are lost.
-    pub fn finish(self, deadline: Option<Instant>) -> Result<Option<PathBuf>, String> {
-        let Self { session, editing, exporting, .. } = self;
-        let (kept, resized) = match editing {
-            Some(mut editing) => (editing.files.finish(), editing.resized),
-            None => (Ok(None), None),
-        };
-        let end = move || {
-            if let Some(resized) = resized {
-                resized.end();
+    pub fn finish(
+        &mut self,
+        deadline: Option<Instant>,
+        signals: &Receiver<SignalEvent>,
+    ) -> Result<Option<PathBuf>, String> {
+        let editing = self.editing.as_mut();
+        let (kept, resized) = editing.map_or((Ok(None), None), |editing| {
+            (editing.files.finish(), editing.resized.take())
+        });
+        // The session runs exports in the order of their requests, so that waiting for the last one
+        // suffices. A panic of its thread drops the sender, too.
+        let writing = self.exporting.take().into_iter().chain(resized.and_then(ResizedExport::end));
+        for written in writing {
+            let noticed = after(NOTICED_AFTER);
+            let ended = deadline.map_or(never(), crossbeam_channel::at);
+            loop {
+                select! {
+                    recv(written) -> _ => break,
+                    recv(signals) -> event => {
+                        if deadline.is_none() && event == Ok(SignalEvent::End(INTERRUPTED)) {
+                            break;
+                        }
+                    }
+                    recv(ended) -> _ => break,
+                    recv(noticed) -> _ => {
+                        eprintln!("A picture is being written; Ctrl-C ends without it.");
+                    }
+                }
             }
-            // The session runs exports in the order of their requests, so that waiting for the last
-            // one suffices. A panic of its thread drops the sender, too.
-            if let Some(last) = exporting {
-                let _ = last.recv();
-            }
-            drop(session);
-        };
-        let patience = deadline
-            .map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
-        // If the thread cannot be started, the session ends, and pictures that were not written are
-        // lost.
-        if let Ok(ending) = Worker::spawn("end", end) {
-            ending.join_within(patience);
         }
         kept
     }

@@ -9,6 +9,7 @@ mod frames;
 mod input;
 mod job_control;
 mod latency;
+mod loading;
 mod tiles;
 mod worker;
 mod writer;
@@ -20,8 +21,9 @@ use crossbeam_channel::{Receiver, unbounded};
 use effects::EffectRunner;
 use event_loop::Dashboard;
 use frames::FramePipeline;
-use job_control::{ENDED_WITHIN, PATIENCE, ResizeDebounce, TerminalIo, handle_signals};
+use job_control::{ENDED_WITHIN, ResizeDebounce, TerminalIo};
 use latency::LatencyRecorder;
+use loading::OpenTerminal;
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -33,11 +35,12 @@ use zerkalo_scene::{SceneErrors, SceneFile};
 use zerkalo_terminal::cells::Oklab;
 use zerkalo_terminal::image::GraphicsMode;
 use zerkalo_terminal::{
-    Environment, HUNG_UP, InputReader, Screen, SignalQueue, cell_px, query_capabilities, size,
+    Environment, HUNG_UP, Screen, TimedEvent, cell_px, query_capabilities, size,
 };
 
 pub use crate::dashboard::model::Colors;
 pub use diagnose::{TerminalReport, diagnose};
+pub use loading::Loading;
 
 /// Parameters of a dashboard.
 pub struct Setup {
@@ -48,7 +51,6 @@ pub struct Setup {
     pub state: Option<PathBuf>,
     pub threads: usize,
     pub options: Options,
-    pub terminal: TerminalSetup,
     /// Path of the CSV file for input latencies; `None` to measure none.
     pub trace: Option<PathBuf>,
 }
@@ -84,11 +86,27 @@ pub struct Ended {
     pub kept: Result<Option<PathBuf>, String>,
 }
 
-/// Runs a dashboard until the user quits, a terminating signal arrives or the terminal is lost.
-pub fn run(setup: Setup) -> io::Result<Ended> {
-    let Setup { file, checkpoint, state, threads, options, terminal, trace } = setup;
+impl Ended {
+    /// Returns the result of a dashboard that has ended before its first frame.
+    fn early(signalled: Option<u8>) -> Self {
+        Self { signalled, exported: Vec::new(), kept: Ok(None) }
+    }
+}
+
+/// Runs a dashboard of what `load` returns until the user quits, a terminating signal arrives or the
+/// terminal is lost.
+pub fn run<E: From<io::Error> + Send + 'static>(
+    loading: Loading,
+    load: impl FnOnce() -> Result<Setup, E> + Send + 'static,
+    terminal: TerminalSetup,
+) -> Result<Ended, E> {
+    let (setup, opened) = match loading.run(load, &terminal.environment)? {
+        Ok(loaded) => loaded,
+        Err(signalled) => return Ok(Ended::early(signalled)),
+    };
+    let Setup { file, checkpoint, state, threads, options, trace } = setup?;
     let (scene, file) = match file {
-        Ok(file) => (Ok(Arc::new(file.document.scene().clone())), Ok(file)),
+        Ok(file) => (Ok(file.document.shared_scene()), Ok(file)),
         Err(FaultyFile { path, errors }) => (Err(errors), Err(path)),
     };
     let (path, name) = match &file {
@@ -107,11 +125,21 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     let is_new = path.as_deref().is_some_and(is_new);
     let mut model = Model::new(path, &name, scene, DEFAULT_STOP);
     model.file.is_new = is_new;
-    run_on_terminal(effects, done, model, terminal, trace)
+    Ok(run_on_terminal((effects, done), model, terminal, opened, trace)?)
 }
 
-/// Shows `films`, which other processes write, as [`run`] shows a scene. No thread traces rays.
-pub fn watch(films: FilmFiles, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
+/// Shows the films that `load` returns, which other processes write, as [`run`] shows a scene. No
+/// thread traces rays.
+pub fn watch<E: From<io::Error> + Send + 'static>(
+    loading: Loading,
+    load: impl FnOnce() -> Result<FilmFiles, E> + Send + 'static,
+    threads: usize,
+    terminal: TerminalSetup,
+) -> Result<Ended, E> {
+    let (films, opened) = match loading.run(load, &terminal.environment)? {
+        Ok((films, opened)) => (films?, opened),
+        Err(signalled) => return Ok(Ended::early(signalled)),
+    };
     let model = Model::new(None, "", Ok(Arc::default()), Stop::default());
     let (results, done) = unbounded();
     let effects = EffectRunner::watching(films, threads, results.clone())?;
@@ -119,28 +147,28 @@ pub fn watch(films: FilmFiles, threads: usize, terminal: TerminalSetup) -> io::R
     if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
         let _ = results.send(report);
     }
-    run_on_terminal(effects, done, model, terminal, None)
+    Ok(run_on_terminal((effects, done), model, terminal, opened, None)?)
 }
 
-/// Runs a dashboard with `model`. `done` receives the results of effects. `trace` is the path of
-/// the file for input latencies.
+/// Runs a dashboard with `model`. `done` receives the results of effects. `opened` is the terminal
+/// if it is in full-screen use already. `trace` is the path of the file for input latencies.
 fn run_on_terminal(
-    effects: EffectRunner,
-    done: Receiver<Message>,
+    (effects, done): (EffectRunner, Receiver<Message>),
     mut model: Model,
     terminal: TerminalSetup,
+    opened: Option<OpenTerminal>,
     trace: Option<PathBuf>,
 ) -> io::Result<Ended> {
     let TerminalSetup { colors, environment, graphics, bandwidth, preferences } = terminal;
-    let signals = SignalQueue::of_terminal()?;
-    let screen = Screen::enter()?;
-    let signals = handle_signals(signals, screen.tty.clone(), PATIENCE)?;
-    let mut input = InputReader::new(&environment);
-    let ending = || signals.caught().is_some();
+    let opened = opened.map_or_else(|| OpenTerminal::new(&environment), Ok)?;
+    let OpenTerminal { screen, signals, mut input } = opened;
+    let ending = |events: &[TimedEvent]| {
+        signals.caught().is_some() || events.iter().any(|timed| loading::quits(&timed.event))
+    };
     let capabilities = query_capabilities(&screen.tty, &mut input, environment, &ending);
     let Ok((mut terminal, screen_size)) = capabilities.and_then(|terminal| Ok((terminal, size()?)))
     else {
-        return Ok(Ended { signalled: Some(HUNG_UP), exported: Vec::new(), kept: Ok(None) });
+        return Ok(Ended::early(Some(HUNG_UP)));
     };
     model.screen = screen_size;
     model.preferences = preferences;
@@ -199,7 +227,7 @@ fn end(
     }
     // The terminal is restored first, because the remaining writes may take a while.
     drop(screen);
-    let kept = dashboard.effects.finish(deadline);
+    let kept = dashboard.effects.finish(deadline, &dashboard.terminal_io.signals);
     let mut ended = Ended { signalled: result?, exported: Vec::new(), kept };
     for message in dashboard.done.try_iter() {
         if let Message::Exported(result) = message {
@@ -209,13 +237,13 @@ fn end(
     if let Some(path) = trace {
         dashboard.latency.write(&path)?;
     }
-    // The process ends without the time to free large scenes and pictures.
-    std::mem::forget((dashboard.model, dashboard.frames));
+    // The process ends without the time to free large scenes and films.
+    std::mem::forget(dashboard);
     Ok(ended)
 }
 
 /// Longest wait for the first report on watched files.
-const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
+const FIRST_REPORT_WITHIN: Duration = Duration::from_millis(300);
 
 /// Initial stop criterion: a noise of half a level.
 const DEFAULT_STOP: Stop =

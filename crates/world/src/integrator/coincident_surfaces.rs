@@ -15,6 +15,7 @@
 //! primitive that may touch another one. Contacts are found at compilation, so that hits on other
 //! primitives cost no lookup.
 
+use crate::integrator::box_tree::BoxTree;
 use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::MediumStack;
 use glam::DVec3;
@@ -35,6 +36,10 @@ const OFFSET_TIES: f64 = 1.5;
 /// in the order of distance.
 const MIN_COSINE: f64 = 0.5;
 
+/// Largest number of contacts in the list of an object. An object with more searches the boxes of
+/// all others, so that the memory grows with the number of objects, not with its square.
+const MAX_LISTED: usize = 64;
+
 /// Kind of a surface, which determines the order in which rays cross coincident surfaces.
 #[derive(Clone, Copy, Debug)]
 enum SurfaceKind {
@@ -48,14 +53,14 @@ enum SurfaceKind {
     Sheet,
 }
 
-/// Primitive that may touch a given primitive.
+/// Object that primitives of other objects may touch.
 #[derive(Clone, Copy, Debug)]
 struct Contact<S> {
-    /// Id of the touching primitive; for a compound, the id of its first part.
+    /// Id of its primitive; for a compound, the id of the first part.
     primitive: u32,
     /// Lower bound of the tie distance \[scene units\].
     tie: S,
-    /// Corners of the touching primitive's bounding box, infinite where it is unbounded.
+    /// Corners of its bounding box, infinite where it is unbounded.
     low: [S; 3],
     high: [S; 3],
 }
@@ -67,21 +72,14 @@ impl<S: Float> Contact<S> {
         Self { primitive, tie: S::from_f64(tie), low, high }
     }
 
-    /// Returns the tie distance at points for which the function [`rounding`] returns `rounding`.
+    /// Returns the lanes whose point may be on the object: at most two distances `tie` from its
+    /// bounding box. One is the range of the search for coincident surfaces, the other is a margin
+    /// for rounding errors.
     #[inline(always)]
-    fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
-        rounding.max(L::splat(self.tie))
-    }
-
-    /// Returns the lanes whose point may be on the touching primitive: at most two tie distances
-    /// from its bounding box. One tie distance is the range of the search for coincident surfaces,
-    /// the other is a margin for rounding errors.
-    #[inline(always)]
-    fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
+    fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, tie: L) -> L::Mask {
         let distance =
             |p: L, axis: usize| (L::splat(self.low[axis]) - p).max(p - L::splat(self.high[axis]));
         let distance = distance(point.x, 0).max(distance(point.y, 1)).max(distance(point.z, 2));
-        let tie = self.tie(rounding);
         distance.le(tie + tie)
     }
 }
@@ -95,8 +93,14 @@ fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
 
 /// Pairs of primitives that may touch each other. In each pair at least one primitive transmits.
 pub(crate) struct Contacts<S> {
-    /// Contacts of each primitive.
-    contacts: Vec<Vec<Contact<S>>>,
+    objects: Vec<Contact<S>>,
+    /// Object of each primitive.
+    object_of: Vec<u32>,
+    /// Objects that may touch each object; `None` if they are more than [`MAX_LISTED`].
+    touching: Vec<Option<Vec<u32>>>,
+    /// For opaque objects, the boxes of those that transmit; for objects that transmit, all boxes.
+    trees: [BoxTree; 2],
+    transmits: Vec<bool>,
     /// Kind of the surface of each primitive, and the magnitude of its layer.
     kinds: Vec<(SurfaceKind, S)>,
 }
@@ -173,17 +177,28 @@ impl<S: Float> Contacts<S> {
         for (source, transparent) in primitives.iter().zip(transparent) {
             transmits[source.form] |= transparent;
         }
-        let mut touching = vec![Vec::new(); forms.len()];
-        for (a, b) in pairs(forms, |a, b| transmits[a] || transmits[b]) {
-            let rounding = (epsilon * forms[a].max_coordinate().max(forms[b].max_coordinate()))
-                .max(input_error);
-            if may_touch(&forms[a], &forms[b], 4.0 * TIE * rounding) {
-                let tie = TIE * rounding;
-                touching[a].push(Contact::new(first[b], &forms[b], tie));
-                touching[b].push(Contact::new(first[a], &forms[a], tie));
-            }
-        }
-        if touching.iter().all(Vec::is_empty) {
+        let objects = forms.iter().zip(&first).map(|(form, first)| {
+            let tie = TIE * (epsilon * form.max_coordinate()).max(input_error);
+            Contact::new(*first, form, tie)
+        });
+        let objects: Vec<Contact<S>> = objects.collect();
+        let boxes: Vec<Bounds> = forms.iter().map(padded_box).collect();
+        let clear = (0..forms.len()).filter(|form| transmits[*form]).collect();
+        let trees = [clear, (0..forms.len()).collect()].map(|forms| BoxTree::new(&boxes, forms));
+        let touching_of = |a: usize| {
+            let mut found = Vec::new();
+            trees[usize::from(transmits[a])].visit(boxes[a], |b| {
+                let slack = 4.0 * objects[a].tie.to_f64().max(objects[b].tie.to_f64());
+                if a != b && may_touch(&forms[a], &forms[b], slack) {
+                    found.push(b as u32);
+                }
+                found.len() <= MAX_LISTED
+            });
+            found.sort_unstable();
+            Some(found).filter(|found| found.len() <= MAX_LISTED)
+        };
+        let touching: Vec<_> = (0..forms.len()).map(touching_of).collect();
+        if touching.iter().all(|touching| touching.as_ref().is_some_and(Vec::is_empty)) {
             return None;
         }
         let count = forms.len() as f64;
@@ -201,8 +216,61 @@ impl<S: Float> Contacts<S> {
             (kind, S::from_f64(layer))
         };
         let kinds = primitives.iter().enumerate().map(kind).collect();
-        let contacts = primitives.iter().map(|id| touching[id.form].clone()).collect();
-        Some(Self { contacts, kinds })
+        let object_of = primitives.iter().map(|id| id.form as u32).collect();
+        Some(Self { objects, object_of, touching, trees, transmits, kinds })
+    }
+
+    /// Calls `visit` with each object that may touch the one of `primitive` near the points of
+    /// `lanes`, with the tie distance and the lanes.
+    #[inline(always)]
+    fn visit_near<L: SimdFloat<Scalar = S>>(
+        &self,
+        primitive: u32,
+        point: Vec3<L>,
+        lanes: L::Mask,
+        mut visit: impl FnMut(&Contact<S>, L, L::Mask),
+    ) {
+        let object = self.object_of[primitive as usize] as usize;
+        let rounding = rounding(point).max(L::splat(self.objects[object].tie));
+        let mut visit = |other: u32| {
+            let contact = &self.objects[other as usize];
+            let tie = rounding.max(L::splat(contact.tie));
+            let near = lanes & contact.is_near(point, tie);
+            if near.any() {
+                visit(contact, tie, near);
+            }
+        };
+        match &self.touching[object] {
+            Some(touching) => touching.iter().copied().for_each(visit),
+            None => self.crowd(object, point, rounding, lanes).into_iter().for_each(&mut visit),
+        }
+    }
+
+    /// Returns the objects that have boxes near the points of `lanes` and may touch `object`, in
+    /// ascending order.
+    #[inline(never)]
+    fn crowd<L: SimdFloat<Scalar = S>>(
+        &self,
+        object: usize,
+        point: Vec3<L>,
+        rounding: L,
+        lanes: L::Mask,
+    ) -> Vec<u32> {
+        let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for lane in (0..L::WIDTH).filter(|lane| lanes.lane(*lane)) {
+            let point = DVec3::from_array(point.lane(lane).map(Float::to_f64));
+            let margin = 2.5 * rounding.lane(lane).to_f64();
+            bounds = (bounds.0.min(point - margin), bounds.1.max(point + margin));
+        }
+        let mut found = Vec::new();
+        self.trees[usize::from(self.transmits[object])].visit(bounds, |other| {
+            if other != object {
+                found.push(other as u32);
+            }
+            true
+        });
+        found.sort_unstable();
+        found
     }
 
     /// Returns the lanes whose `point`, on `primitives`, may be on a second primitive as
@@ -215,12 +283,9 @@ impl<S: Float> Contacts<S> {
         point: Vec3<L>,
         lanes: L::Mask,
     ) -> L::Mask {
-        let rounding = rounding(point);
         let mut near = L::mask(false);
         for (primitive, lanes) in distinct(primitives, lanes) {
-            for contact in &self.contacts[primitive as usize] {
-                near = near | (lanes & contact.is_near(point, rounding));
-            }
+            self.visit_near(primitive, point, lanes, |_, _, lanes| near = near | lanes);
         }
         near
     }
@@ -285,16 +350,10 @@ impl<S: Float> Contacts<S> {
             layer,
             offset: L::zero(),
         };
-        let rounding = rounding(coincident.point);
-        for (primitive, primitive_lanes) in distinct(coincident.primitive, coincident.lanes) {
-            for contact in &self.contacts[primitive as usize] {
-                let near = primitive_lanes & contact.is_near(coincident.point, rounding);
-                if near.none() {
-                    continue;
-                }
+        for (primitive, lanes) in distinct(coincident.primitive, coincident.lanes) {
+            self.visit_near(primitive, coincident.point, lanes, |contact, tie, near| {
                 // The search ray runs along the surface normal through the start point, so that the
                 // result does not depend on the angle at which the path leaves.
-                let tie = contact.tie(rounding);
                 let origin = coincident.axis.mul_add(-tie, coincident.point);
                 let limit = L::select(near, tie + tie, L::from_f64(-1.0));
                 let ray = Ray { origin, direction: coincident.axis };
@@ -323,7 +382,7 @@ impl<S: Float> Contacts<S> {
                     out.triangle = L::select(nearer, hit.triangle, out.triangle);
                     out.layer = L::select(nearer, layer, out.layer);
                 }
-            }
+            });
         }
         out
     }
@@ -351,17 +410,19 @@ pub(crate) fn first_primitives(forms: &[Form], primitives: &[PrimitiveId]) -> Ve
     first
 }
 
-/// Returns the indices of all pairs of objects for which `wanted` is true and whose bounding boxes
-/// overlap. Each box is enlarged by 1e-5 of its largest coordinate. The smaller index of a pair
+/// Returns the bounding box of an object, enlarged by 1e-5 of its largest coordinate.
+fn padded_box(form: &Form) -> Bounds {
+    form.bounds().map_or(UNBOUNDED, |(low, high)| {
+        let margin = 1e-5 * low.abs().max(high.abs()).max_element();
+        (low - margin, high + margin)
+    })
+}
+
+/// Returns the indices of all pairs of objects for which `wanted` is true and whose padded bounding
+/// boxes overlap. The smaller index of a pair
 /// comes first, and the pairs are sorted.
 pub(crate) fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
     let mut out = Vec::new();
-    let padded_box = |form: &Form| {
-        form.bounds().map_or(UNBOUNDED, |(low, high)| {
-            let margin = 1e-5 * low.abs().max(high.abs()).max_element();
-            (low - margin, high + margin)
-        })
-    };
     let boxes: Vec<_> = forms.iter().map(padded_box).collect();
     let order = ascending(boxes.iter().map(|(low, _)| total_order(low.x)).collect());
     for (i, a) in order.iter().enumerate() {
@@ -444,5 +505,39 @@ mod tests {
         let forms = [ball(0.0, 1.0), plane(DVec3::Y, 7.0), ball(5.0, 1.0), ball(0.5, 1.0)];
         let found = pairs(&forms, |a, b| a == 1 || b == 1 || a + b == 3);
         assert_eq!(found, [(0, 1), (0, 3), (1, 2), (1, 3)]);
+    }
+    /// Checks that an object that touches many others has no list of them, and that the same ones
+    /// are found near a point.
+    #[test]
+    fn crowded_objects_have_no_lists() {
+        let ball = |i: usize| {
+            let center = DVec3::new((i * 37 % 100) as f64, (i * 61 % 100) as f64, 0.0) * 0.01;
+            Form::Sphere(SphereForm { center, radius: 1.0 })
+        };
+        let forms: Vec<Form> = (0..200).map(ball).collect();
+        let primitives: Vec<_> = (0..200).map(|form| PrimitiveId { form, part: 0 }).collect();
+        let transparent: Vec<bool> = (0..200).map(|i| i % 2 == 0).collect();
+        let priorities: Vec<u32> = (0..200).map(|i| if i % 2 == 0 { i + 1 } else { 0 }).collect();
+        let contacts =
+            Contacts::<f64>::new(&forms, &primitives, &transparent, &priorities, 1e-16, 0.0);
+        let contacts = contacts.unwrap();
+        assert!(contacts.touching.iter().all(Option::is_none));
+        let mut count = 0;
+        for a in 0..200 {
+            let [x, y, z] = (forms[a].bounds().unwrap().1 - DVec3::new(1.0, 1.0, 0.0)).to_array();
+            let mut found = Vec::new();
+            contacts.visit_near(a as u32, Vec3::new(x, y, z), true, |contact, _, _| {
+                found.push(contact.primitive);
+            });
+            let near = |b: &u32| {
+                let (low, high) = forms[*b as usize].bounds().unwrap();
+                let point = DVec3::new(x, y, z);
+                point.cmpge(low - 1e-13).all() && point.cmple(high + 1e-13).all()
+            };
+            let wanted = |b: &u32| *b != a as u32 && (a % 2 == 0 || b % 2 == 0) && near(b);
+            assert_eq!(found, (0..200).filter(wanted).collect::<Vec<_>>());
+            count += found.len();
+        }
+        assert!(count > 1000, "{count}");
     }
 }

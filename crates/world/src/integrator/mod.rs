@@ -2,6 +2,7 @@
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
+mod box_tree;
 pub(crate) mod clear_panes;
 pub(crate) mod coincident_surfaces;
 mod direct_lighting;

@@ -5,14 +5,14 @@ pub mod image_viewer;
 pub mod paths;
 
 use crate::dashboard::run::files::SharedFile;
-use crate::dashboard::run::worker::Worker;
 use crate::dashboard::{Exported, Format, Message};
-use crossbeam_channel::{Sender, bounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use paths::{numbered, scp};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
 use std::time::Duration;
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::export::{Provenance, scene_hash};
@@ -109,7 +109,10 @@ pub struct ResizedExport {
     /// `true` if the picture is to be written as it is.
     finished: Arc<AtomicBool>,
     cancelled: Arc<AtomicBool>,
-    worker: Worker<()>,
+    /// `true` from the beginning of the write.
+    is_writing: Arc<AtomicBool>,
+    /// Receiver that is disconnected at the end of the thread.
+    ended: Receiver<()>,
 }
 
 impl ResizedExport {
@@ -122,23 +125,26 @@ impl ResizedExport {
         exporter: Exporter,
         results: Sender<Message>,
     ) -> io::Result<Self> {
-        let [finished, cancelled] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
-        let [finish_flag, cancel_flag] = [&finished, &cancelled].map(Arc::clone);
-        let worker = Worker::spawn("export", move || {
+        let [finished, cancelled, is_writing] = [(); 3].map(|()| Arc::<AtomicBool>::default());
+        let flags = [&finished, &cancelled, &is_writing].map(Arc::clone);
+        let (running, ended) = bounded(0);
+        thread::Builder::new().name("export".into()).spawn(move || {
+            let _running: Sender<()> = running;
+            let [finish_flag, cancel_flag, write_flag] = &flags;
             let report_progress = |progress| {
                 if !cancel_flag.load(Ordering::Relaxed) {
                     // Sending fails only at the end of the program, when the receiver is gone.
                     let _ = results.send(Message::ExportProgress(progress));
                 }
             };
-            let flags = [&*finish_flag, &*cancel_flag];
+            let flags = [&**finish_flag, cancel_flag, write_flag];
             let result = finish(session, format, exporter, flags, report_progress);
             report_progress(None);
             if let Some(result) = result {
                 let _ = results.send(Message::Exported(result));
             }
         })?;
-        Ok(Self { finished, cancelled, worker })
+        Ok(Self { finished, cancelled, is_writing, ended })
     }
 
     /// Ends the render and writes the picture as it is.
@@ -148,13 +154,14 @@ impl ResizedExport {
 
     /// Cancels the render. A file that is being written is completed.
     pub fn cancel(&self) {
-        self.cancelled.store(true, Ordering::Relaxed);
+        self.cancelled.store(true, Ordering::SeqCst);
     }
 
-    /// Cancels the render and waits for the end of its thread.
-    pub fn end(self) {
+    /// Cancels the render. If the picture is being written, returns the receiver that is
+    /// disconnected at the end of the write.
+    pub fn end(self) -> Option<Receiver<()>> {
         self.cancel();
-        self.worker.join_within(Duration::MAX);
+        self.is_writing.load(Ordering::SeqCst).then_some(self.ended)
     }
 }
 
@@ -164,7 +171,7 @@ fn finish(
     session: Session,
     format: Format,
     exporter: Exporter,
-    [finished, cancelled]: [&AtomicBool; 2],
+    [finished, cancelled, is_writing]: [&AtomicBool; 3],
     report_progress: impl Fn(Option<(f64, Option<Interval>)>),
 ) -> Option<Result<Exported, String>> {
     let mut is_complete = false;
@@ -186,6 +193,10 @@ fn finish(
                 report_progress(Some((progress, snapshot.report.eta_seconds)));
             }
         }
+    }
+    is_writing.store(true, Ordering::SeqCst);
+    if cancelled.load(Ordering::SeqCst) {
+        return None;
     }
     let (sender, receiver) = bounded(1);
     session.submit(move |picture| {

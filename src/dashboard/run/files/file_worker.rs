@@ -21,6 +21,8 @@ pub enum Job {
         overwrite: bool,
         /// Receiver that is disconnected as soon as the recovery file is up to date.
         prepared: Receiver<()>,
+        /// Sender that is dropped after the save.
+        saving: Sender<()>,
     },
     /// Read the scene file.
     Load,
@@ -58,7 +60,7 @@ impl FileWorker {
         loop {
             let next_check = checked + CHECK_INTERVAL;
             match inbox.recv_deadline(next_check) {
-                Ok(Job::Save { scene, path, overwrite, prepared }) => {
+                Ok(Job::Save { scene, path, overwrite, prepared, saving: _saving }) => {
                     let _ = prepared.recv_timeout(PREPARED_WITHIN);
                     let saved = self.save(&scene, path, overwrite);
                     self.send(Message::Saved(scene, saved));
@@ -135,7 +137,7 @@ impl FileWorker {
         self.seen = self.path.as_deref().and_then(FileStamp::of);
         self.is_broken = false;
         let opened = OpenedScene {
-            scene: Arc::new(file.document.scene().clone()),
+            scene: file.document.shared_scene(),
             path: self.path.clone(),
             name: self.path.as_deref().map_or(file.document.name.clone(), short_name),
             is_new: self.path.is_some() && self.seen.is_none(),
@@ -205,7 +207,7 @@ impl FileWorker {
             (None, Some(path)) => self.file.insert(SceneFile::open(path)?),
             (None, None) => return Ok(Arc::default()),
         };
-        let scene = Arc::new(file.document.scene().clone());
+        let scene = file.document.shared_scene();
         self.shared.put(file);
         Ok(scene)
     }

@@ -12,7 +12,7 @@ use crate::dashboard::run::worker::Worker;
 use autosave::Autosave;
 pub use autosave_worker::AutosaveJob;
 use autosave_worker::AutosaveWorker;
-use crossbeam_channel::{Sender, bounded, unbounded};
+use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
 use file_worker::FileWorker;
 pub use file_worker::Job;
 pub use shared_file::SharedFile;
@@ -41,6 +41,8 @@ pub struct Files {
     pub shared: SharedFile,
     /// Newest scene with unsaved edits.
     unsaved: Option<Arc<Scene>>,
+    /// Receiver that is disconnected after the last requested save.
+    saving: Option<Receiver<()>>,
     threads: Option<(Worker<()>, Worker<Kept>)>,
 }
 
@@ -87,15 +89,18 @@ impl Files {
             Worker::spawn("files", move || worker.run(&inbox))?,
             Worker::spawn("autosave", move || autosave_worker.run(&autosave_inbox))?,
         );
-        Ok(Self { jobs, autosaves, shared, unsaved: None, threads: Some(threads) })
+        let threads = Some(threads);
+        Ok(Self { jobs, autosaves, shared, unsaved: None, saving: None, threads })
     }
 
     /// Writes `scene` to the scene file, or to `path`, which then becomes the scene file.
     /// `overwrite` permits replacing what another program has written.
-    pub fn save(&self, scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool) {
+    pub fn save(&mut self, scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool) {
         let (preparing, prepared) = bounded(0);
+        let (saving, saved) = bounded(0);
+        self.saving = Some(saved);
         self.give_autosave(AutosaveJob::Saving(Arc::clone(&scene), preparing));
-        self.give(Job::Save { scene, path, overwrite, prepared });
+        self.give(Job::Save { scene, path, overwrite, prepared, saving });
     }
 
     /// Schedules an autosave: after a pause in editing, after a second of edits, or when the
@@ -121,7 +126,9 @@ impl Files {
     pub fn finish(&mut self) -> Result<Option<PathBuf>, String> {
         let Some((files, autosave)) = self.threads.take() else { return Ok(None) };
         self.give(Job::End);
-        files.join_within(SAVED_WITHIN);
+        // The thread may still be reading a large file.
+        let _ = self.saving.take().map(|saved| saved.recv_timeout(SAVED_WITHIN));
+        files.join_within(Duration::ZERO);
         self.give_autosave(AutosaveJob::End);
         match (autosave.join_within(KEPT_WITHIN), self.unsaved.take(), self.shared.get()) {
             (Some(kept), ..) => kept,
@@ -198,7 +205,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
         fs::write(&path, STARTER).unwrap();
-        let (files, inbox) = opened(&path);
+        let (mut files, inbox) = opened(&path);
         let mut scene = Scene::parse(STARTER, "a").unwrap();
         scene.film.size = [64, 48];
         files.save(Arc::new(scene.clone()), None, false);
@@ -229,7 +236,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
         fs::write(&path, "[camera").unwrap();
-        let (files, inbox) = opened(&path);
+        let (mut files, inbox) = opened(&path);
         files.give(Job::Load);
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_err());
         files.save(Arc::default(), None, true);
@@ -305,7 +312,7 @@ mod tests {
         let path = folder.path().join("new.toml");
         let (results, _inbox) = unbounded();
         let untitled = SceneFile::untitled(STARTER.to_string(), "starter").unwrap();
-        let files = Files::new(Ok(untitled), None, results).unwrap();
+        let mut files = Files::new(Ok(untitled), None, results).unwrap();
         let scene = Scene::parse(STARTER, "starter").unwrap();
         files.save(Arc::new(scene), Some(path.clone()), false);
         drop(files);
