@@ -4,7 +4,7 @@
 
 pub(crate) mod clear_panes;
 pub(crate) mod coincident_surfaces;
-mod direct_lighting;
+pub(crate) mod direct_lighting;
 mod emitter_lighting;
 mod environment_lighting;
 pub(crate) mod first_hit;
