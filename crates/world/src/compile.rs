@@ -14,6 +14,7 @@ use crate::lights::choice::LightChoice;
 use crate::lights::emissive_sheets::{Emits, move_off_surfaces};
 use crate::lights::emitters::{Emitters, ObjectGeometry};
 use crate::lights::groups::{LightGroupSource, LightGroups};
+use crate::lights::mirror_images::{MirrorFace, MirrorImages};
 use crate::lights::on_surfaces::{OnSurface, WRITTEN};
 use crate::world::{DeltaSource, EnvironmentSource, ShadowRayTarget, World, WorldInfo};
 use glam::{DAffine3, DVec3};
@@ -249,6 +250,8 @@ pub(super) struct CompiledLights<S> {
     /// Lights with a size and emissive objects.
     pub emitters: Emitters<S>,
     pub environments: Vec<EnvironmentSource<S>>,
+    /// Images of emitters towards which diffuse bounces go; `None` if there are none.
+    pub mirror_images: Option<MirrorImages<S>>,
 }
 
 impl<S: Float> CompiledLights<S> {
@@ -305,7 +308,16 @@ impl<S: Float> CompiledLights<S> {
             is_entered: &is_entered,
         };
         let emitters = Emitters::new(emitters, &objects, groups);
-        (Self { delta_lights, choice, emitters, environments }, scales)
+        let faces = |id: &PrimitiveId| {
+            let material = materials.materials[materials.index(id) as usize];
+            MirrorFace::all_of(&geometry.forms[id.form], material)
+        };
+        let mirror_images = materials.diffuse_limits(scene).filter(|limits| limits.caustics);
+        let mirror_images = mirror_images.and_then(|_| {
+            let faces: Vec<MirrorFace> = primitives.iter().flat_map(faces).collect();
+            MirrorImages::new(&faces, &emitters.outlines())
+        });
+        (Self { delta_lights, choice, emitters, environments, mirror_images }, scales)
     }
 
     /// Returns `true` if there are lights with a size, environment lights or emissive objects.

@@ -5,7 +5,8 @@
 //! chosen for the diffuse bounce, with a probability in proportion to the light that it can pass on
 //! (weighted reservoir sampling, Chao 1982, *A General Purpose Unequal Probability Sampling Plan*).
 //! The next generation starts at the chosen hit, in a direction whose density is the cosine to the
-//! normal, divided by pi. Mirrors therefore have no more noise than without diffuse bounces, and a
+//! normal, divided by pi, mixed with directions of emitters in mirrors (`lights/mirror_images.rs`).
+//! Mirrors therefore have no more noise than without diffuse bounces, and a
 //! path bounces at most once per generation.
 //!
 //! Emitters and environments are sampled at every hit. A ray that starts at a diffuse bounce
@@ -120,10 +121,13 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
 
     /// Returns the rays that leave the chosen hits by a diffuse bounce.
     fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
-        let direction = Frame::around(self.normal).to_world(cosine_hemisphere(u, v));
+        let (direction, ratio) = match &world.lights.mirror_images {
+            Some(images) => images.sample_bounce((self.origin, self.normal), (u, v)),
+            None => (Frame::around(self.normal).to_world(cosine_hemisphere(u, v)), L::one()),
+        };
         // The throughput is divided by the probability of the choice, weight / sum.
         let weight = self.throughput.max_element();
-        let scale = self.sum / L::select(self.lanes, weight, L::one());
+        let scale = self.sum * ratio / L::select(self.lanes, weight, L::one());
         let path = Path {
             ray: Ray { origin: self.origin, direction },
             throughput: Path::bounded(self.throughput * scale),

@@ -4,9 +4,9 @@
 //! Two strategies find this light. The first one samples a point of the emitter and traces a shadow
 //! ray to it. The second one samples the direction of the reflected or transmitted ray, which may
 //! hit the emitter. A shadow ray does not pass through solids: inside one, it ends at the far
-//! side. Rays that enter a solid therefore use the second strategy only, with full weight. Both
-//! strategies are combined, with weights, in three cases: for reflected rays, for rays that leave a
-//! solid, and at thin surfaces.
+//! side. Rays that enter a solid or stay in it therefore use the second strategy only, with full
+//! weight. Both strategies are combined, with weights, in three cases: for rays that are reflected
+//! outside, for rays that leave a solid, and at thin surfaces.
 
 use crate::integrator::emitter_lighting::power_heuristic;
 use crate::integrator::nested_dielectrics::{InterfaceHit, Media, NestedDielectrics, attenuated};
@@ -55,8 +55,9 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
         // not find this light, so the two strategies cannot be combined.
         let combined = L::mask(world.lights.has_emitters() && world.shadows);
         let rough = vertex.not_delta(hit.lanes & combined);
-        let reflecting = rough.and_not(hit.suppressed | coincident | interaction.covered);
-        let transmitting = reflecting & (hit.media.thin | !hit.media.outer);
+        let lit = rough.and_not(hit.suppressed | coincident | interaction.covered);
+        let (thin, outer) = (hit.media.thin, hit.media.outer);
+        let (reflecting, transmitting) = (lit & (thin | outer), lit & (thin | !outer));
         Self { hit, query, reflecting, transmitting }
     }
 

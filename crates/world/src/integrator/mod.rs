@@ -5,7 +5,7 @@
 mod box_tree;
 pub(crate) mod clear_panes;
 pub(crate) mod coincident_surfaces;
-mod direct_lighting;
+pub(crate) mod direct_lighting;
 mod emitter_lighting;
 mod environment_lighting;
 pub(crate) mod first_hit;

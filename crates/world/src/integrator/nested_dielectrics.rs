@@ -9,6 +9,7 @@
 use crate::compile::RecenteredGeometry;
 use crate::integrator::coincident_surfaces::Contacts;
 use crate::integrator::interaction::SurfaceInteraction;
+use crate::integrator::transmission::{ROUGH_SPLIT_DEPTH, SPLIT_DEPTH};
 use crate::integrator::vertex::Vertex;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, distinct};
@@ -135,6 +136,9 @@ pub(crate) struct NestedDielectrics<L: SimdFloat> {
     around_eye: Vec<(u32, Aggregate<L>)>,
     /// Primitives that may touch a transmissive primitive; `None` if there are none.
     pub contacts: Option<Contacts<L::Scalar>>,
+    /// Number of the first surface, counted from 1, at which paths choose between reflection and
+    /// transmission.
+    pub first_choice: u32,
 }
 
 /// Hits of a packet on transmissive surfaces (interfaces).
@@ -218,7 +222,18 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let absorption: Vec<_> = solids.iter().map(absorption_of).collect();
         let absorbs = absorption.iter().flatten().any(|c| c.to_f64() > 0.0);
         let absorption = absorbs.then_some(absorption);
-        Some(Self { priority_of, indices, absorption, clear_panes, around_eye, contacts })
+        let spreads = |bsdf: &Bsdf<_>| bsdf.transmission.is_some() && !bsdf.is_delta();
+        let split_depth =
+            if bsdfs.iter().any(spreads) { ROUGH_SPLIT_DEPTH } else { SPLIT_DEPTH as u32 };
+        Some(Self {
+            priority_of,
+            indices,
+            absorption,
+            clear_panes,
+            around_eye,
+            contacts,
+            first_choice: split_depth + 1,
+        })
     }
 
     /// Returns `true` if `primitive` bounds a solid that paths can be inside of.

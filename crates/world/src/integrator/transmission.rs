@@ -17,7 +17,10 @@ use zerkalo_scene::material::Interface;
 /// Number of surfaces, counted from the eye or from the latest diffuse bounce, at which a path
 /// splits into reflection and refraction if the surface is an interface. At later interfaces one of
 /// the two is chosen at random.
-const SPLIT_DEPTH: usize = 2;
+pub(crate) const SPLIT_DEPTH: usize = 2;
+
+/// [`SPLIT_DEPTH`] of rough interfaces. Their light is noisy in any case.
+pub(crate) const ROUGH_SPLIT_DEPTH: u32 = 1;
 
 /// One branch of a packet of paths, which split into reflection and transmission at interfaces. All
 /// paths of the branch have hit the same number of surfaces.
@@ -54,6 +57,8 @@ struct Split<'a, L: SimdFloat> {
     reflects: L::Mask,
     /// Lanes whose transmitted paths continue.
     transmits: L::Mask,
+    /// Lanes that transmit with roughness.
+    spreads: L::Mask,
 }
 
 /// Integrator of scenes with transmission.
@@ -161,7 +166,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let coincident_lanes = coincident.as_ref().map_or(L::mask(false), |state| state.lanes);
         let query = interface_hit.query(&vertex);
         let rough = RoughInterface::new(&vertex, interface_hit, &query, coincident_lanes);
-        if rough.reflecting.any() {
+        if (rough.reflecting | rough.transmitting).any() {
             vertex.interface_lighting(&rough, self.nested_dielectrics);
         }
         let mut split = Split::new(&mut vertex, &rough);
@@ -275,8 +280,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
 
     /// Continues `branch` with the transmitted paths, or with the reflected paths in lanes that
     /// have no transmitted one. Lanes with both store the reflected branch in `waiting`, or choose
-    /// one of the two at random after [`SPLIT_DEPTH`] surfaces. `coincident` is the state of
-    /// transmitted rays. Returns `false` if no path continues.
+    /// one of the two at random after [`SPLIT_DEPTH`] surfaces, [`ROUGH_SPLIT_DEPTH`] if the surface
+    /// is rough. `coincident` is the state of transmitted rays. Returns `false` if no path continues.
     fn follow(
         &self,
         branch: &mut Branch<L>,
@@ -285,32 +290,37 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         waiting: &mut [Option<Branch<L>>],
         counts: &mut Counts,
     ) -> bool {
-        let Split { rough, reflected, transmitted, reflects, transmits, .. } = split;
+        let Split { rough, reflected, transmitted, reflects, transmits, spreads, .. } = split;
         let (reflects, mut transmits) = (*reflects, *transmits);
         let lanes = reflects | transmits;
         let bounce = branch.bounce + 1;
         let media = rough.hit.stack_reflected(&branch.media);
         let reversed = coincident.map(CoincidentState::reversed);
         let both = reflects & transmits;
-        if both.any() {
-            if bounce as usize <= SPLIT_DEPTH {
-                let entry = waiting.len() + bounce as usize - 1 - SPLIT_DEPTH;
-                waiting[entry] = Some(Branch {
-                    path: *reflected,
-                    lanes: both,
-                    media,
-                    bounce,
-                    coincident: reversed,
-                });
-            } else {
-                counts.glossy = true;
-                let [r, t] = [&*reflected, &*transmitted].map(|path| path.throughput.max_element());
-                let number = self.base.sampler.branch_1d(bounce - 1 - SPLIT_DEPTH as u32);
-                transmits = transmits.and_not(both & (number * (r + t)).lt(r));
-                for (path, own) in [(&mut *reflected, r), (&mut *transmitted, t)] {
-                    let scaled = path.throughput * ((r + t) / own);
-                    path.throughput = Vec3::select(both, scaled, path.throughput);
-                }
+        let splits = match bounce as usize <= SPLIT_DEPTH {
+            true => both.and_not(*spreads & L::mask(bounce > ROUGH_SPLIT_DEPTH)),
+            false => L::mask(false),
+        };
+        if splits.any() {
+            let entry = waiting.len() + bounce as usize - 1 - SPLIT_DEPTH;
+            waiting[entry] = Some(Branch {
+                path: *reflected,
+                lanes: splits,
+                media,
+                bounce,
+                coincident: reversed,
+            });
+        }
+        let chooses = both.and_not(splits);
+        if chooses.any() {
+            counts.glossy = true;
+            let [r, t] = [&*reflected, &*transmitted].map(|path| path.throughput.max_element());
+            let first = self.nested_dielectrics.first_choice;
+            let number = self.base.sampler.branch_1d(bounce - first);
+            transmits = transmits.and_not(chooses & (number * (r + t)).lt(r));
+            for (path, own) in [(&mut *reflected, r), (&mut *transmitted, t)] {
+                let scaled = path.throughput * ((r + t) / own);
+                path.throughput = Vec3::select(chooses, scaled, path.throughput);
             }
         }
         branch.path = Path::select(transmits, transmitted, reflected);
@@ -367,11 +377,13 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             transmitted: path(interaction.ray_origin_behind(), refracted),
             reflects: interaction.reflecting | hit.lanes,
             transmits: hit.lanes,
+            spreads: L::mask(false),
         };
         let mut numbers = None;
         for (index, lanes) in interaction.bsdfs(interaction.reflecting | hit.lanes) {
             let bsdf = &world.bsdfs[index];
             if bsdf.transmission.is_some() && !bsdf.is_delta() {
+                split.spreads = split.spreads | lanes;
                 split.sample_rough(vertex, index, lanes, &mut numbers);
             } else {
                 split.sample_smooth(vertex, index, lanes, &mut numbers);

@@ -382,6 +382,15 @@ impl<S: Float> Emitters<S> {
         visible.filter_map(|source| Some((source.light.as_ref()?, source)))
     }
 
+    /// Returns a sphere around each emitter near the scene, and the normal of its only side, if it
+    /// is flat and has one.
+    pub fn outlines(&self) -> Vec<(BoundingSphere, Option<DVec3>)> {
+        let outline = |light: &Emitter<S>| {
+            (BoundingSphere { center: light.center, radius: light.radius }, light.normal())
+        };
+        self.sampled().filter(|light| !light.is_distant()).map(outline).collect()
+    }
+
     /// Returns a sphere around each emitter from which light is sampled, or around the emitters of
     /// each choice.
     pub fn balls(&self) -> Vec<BoundingSphere> {

@@ -9,4 +9,5 @@ pub(crate) mod emissive_sheets;
 pub(crate) mod emitter_choice;
 pub(crate) mod emitters;
 pub(crate) mod groups;
+pub(crate) mod mirror_images;
 pub(crate) mod on_surfaces;
