@@ -29,6 +29,9 @@ impl OpenTerminal {
     }
 }
 
+/// What was loaded, and the terminal if it is in full-screen use by then.
+type Loaded<T> = (T, Option<OpenTerminal>);
+
 /// Name of the scene or films being loaded, and messages, for the terminal.
 pub struct Loading {
     pub name: String,
@@ -37,14 +40,13 @@ pub struct Loading {
 }
 
 impl Loading {
-    /// Runs `load` in a thread of its own. Returns its result, with the terminal if that is in
-    /// full-screen use by then. If the user quits or a signal arrives, returns the exit status of
-    /// the signal as an error.
+    /// Runs `load` in a thread of its own and returns its result. If the user quits or a signal
+    /// arrives, returns the exit status of the signal as an error.
     pub(super) fn run<T: Send + 'static>(
         self,
         load: impl FnOnce() -> T + Send + 'static,
         environment: &Environment,
-    ) -> io::Result<Result<(T, Option<OpenTerminal>), Option<u8>>> {
+    ) -> io::Result<Result<Loaded<T>, Option<u8>>> {
         let (sender, loaded) = bounded(1);
         let load = move || drop(sender.send(load()));
         std::thread::Builder::new().name("load".into()).spawn(load)?;
