@@ -152,7 +152,8 @@ impl ShardTracer<'_> {
     /// Traces a shard of `job` into the claimed file, or continues it.
     pub fn trace(&mut self, job: &Job, number: u32, claim: &mut Claim) -> Result<Traced, Failure> {
         let path = claim.path().to_path_buf();
-        let saved = match saved(&path, &job.head, number)? {
+        let is_new = !claim.has_file();
+        let saved = match if is_new { Saved::Nothing } else { saved(&path, &job.head, number)? } {
             Saved::Complete(rays) => {
                 print_line(&format!("{}  complete already  {rays} rays", path.display()))?;
                 return Ok(Traced::Done);
@@ -163,7 +164,7 @@ impl ShardTracer<'_> {
         let share = job.plan.share(number);
         let state = self.state.take().ok_or("no compiled scene")?;
         let mut render = ShardRender::new(state, &job.plan, share.clone(), self.threads)?;
-        let mut existing = if path.exists() { Existing::Replace } else { Existing::Refuse };
+        let mut existing = if is_new { Existing::Refuse } else { Existing::Replace };
         let mut write = |render: &ShardRender, complete| {
             let shards = vec![PartShard { number, complete, samples: render.samples() }];
             let part = Part { plan: Arc::clone(&job.head), shards, rays: render.rays() };
@@ -173,7 +174,7 @@ impl ShardTracer<'_> {
             existing = Existing::Replace;
             Ok::<_, WriteError>(())
         };
-        if saved.is_none() && !path.exists() {
+        if is_new {
             // The empty part shows other processes that the shard is taken.
             match write(&render, false) {
                 Err(error) if is_taken(&error) => {

@@ -1,6 +1,6 @@
 //! `zerkalo work`: traces the shards of a job together with other processes, through all rounds.
 //!
-//! A worker takes the first shard that nobody has begun. When all are taken, the workers wait; one
+//! A worker takes the first shard that no worker has begun. When all are taken, the workers wait; one
 //! of them, which holds the lock of the plan, continues shards of dead processes and plans the next
 //! round. If it dies, another one does. Nothing else coordinates them.
 

@@ -116,7 +116,7 @@ const STORIES: &[Story] = &[
     (
         "zerkalo man pages && ls pages",
         0,
-        "zerkalo-render.1\nzerkalo-scenes.1\nzerkalo-watch.1\nzerkalo.1\n",
+        "zerkalo-status.1\nzerkalo-watch.1\nzerkalo-work.1\nzerkalo.1\n",
         "",
     ),
     // No terminal, help, signals, deadline.

@@ -46,6 +46,11 @@ impl Claim {
         self.owned && self.locked.is_none()
     }
 
+    /// Returns `true` if the file existed when it was claimed, or was written since.
+    pub fn has_file(&self) -> bool {
+        self.owned
+    }
+
     /// Path of the claimed file.
     pub fn path(&self) -> &Path {
         &self.path
