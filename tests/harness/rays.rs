@@ -143,7 +143,7 @@ impl Traced {
         let mut radiance = Radiance::black();
         for (ray, count) in packets::<L>(lines) {
             let draws = points.for_pixel(sampler.key((0, 0), 0));
-            world.trace(&mut Path::new(ray), None, &draws, L::mask(true), &mut radiance);
+            world.trace(&mut Path::new(ray), None, &draws, L::mask(true), &mut radiance, None);
             for i in 0..count {
                 let mut sum = DVec3::ZERO;
                 for (group, weight) in radiance.groups.iter().zip(&self.weights) {

@@ -76,7 +76,7 @@ pub fn trace_packet<L: SimdFloat>(
     let corner = Vec3::splat(world.camera.pixel_corner_direction(pixel));
     let mut path = Path::new(world.camera.rays(corner, jitter));
     let mut radiance = Radiance::black();
-    world.trace(&mut path, None, &draws, active, &mut radiance);
+    world.trace(&mut path, None, &draws, active, &mut radiance, None);
     let groups = &radiance.groups[..world.info.scales.len()];
     let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Float::to_f64)).collect();
     (0..L::WIDTH).map(of_lane).collect()

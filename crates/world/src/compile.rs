@@ -7,7 +7,7 @@ use crate::analysis::truncation_bias::{left_out, truncation_bounds};
 use crate::any_world::Precision;
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::culling::tile::{Culling, CullingMode, FrustumCuller, LightBounds, TileCandidates};
-use crate::integrator::indirect_diffuse::DiffuseLimits;
+use crate::integrator::indirect_diffuse::{DiffuseLimits, MIN_WALK};
 use crate::integrator::nested_dielectrics::{NestedDielectrics, may_reach};
 use crate::integrator::surface_textures::SurfaceTextures;
 use crate::lights::choice::LightChoice;
@@ -186,8 +186,13 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         let IntegratorSettings { max_diffuse_depth: depth, caustics, .. } = scene.trace;
         let is_diffuse = |m: &&Material| m.diffuse > 0.0 && m.color.0 != [0.0; 3];
         let traced = scene.trace.ray_types == RayTypes::Full && depth > 0;
-        (traced && self.materials.iter().any(is_diffuse))
-            .then_some(DiffuseLimits { depth, caustics })
+        // Paths that transmit carry their media, which the queue does not hold.
+        let walks = depth >= MIN_WALK && self.bsdfs.iter().all(|bsdf| bsdf.transmission.is_none());
+        (traced && self.materials.iter().any(is_diffuse)).then_some(DiffuseLimits {
+            depth,
+            caustics,
+            walks,
+        })
     }
 
     fn has_secondary(&self) -> bool {

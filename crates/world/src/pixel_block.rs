@@ -85,7 +85,10 @@ impl<S: Float> PixelBlock<S> {
 
     /// Iterates over the pixels of the block in ranges of `packet_pixels` each; the last range may
     /// be shorter.
-    pub fn packets(&self, packet_pixels: usize) -> impl Iterator<Item = Range<usize>> + use<S> {
+    pub fn packets(
+        &self,
+        packet_pixels: usize,
+    ) -> impl Iterator<Item = Range<usize>> + Clone + use<S> {
         let count = self.count;
         (0..count).step_by(packet_pixels).map(move |first| first..count.min(first + packet_pixels))
     }

@@ -2,11 +2,12 @@
 //! functions.
 
 use crate::culling::tile::TileCandidates;
+use crate::integrator::bounce_queue::{BounceQueue, first_lanes};
 use crate::integrator::path::{Counts, Path, Radiance};
 use crate::pixel_block::PixelBlock;
 use crate::world::World;
 use std::ops::Range;
-use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
+use zerkalo_kernel::lanes::{SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp::disk;
 use zerkalo_kernel::sampling::{PacketSampler, SampleSettings, Sampler};
 
@@ -58,6 +59,7 @@ impl<L: SimdFloat> CameraTracer<'_, L> {
             candidates: None,
             pixels: PixelBlock::new(&self.world.camera, &self.sampler, replicate, pixels),
             radiance: Radiance::black(),
+            queue: self.world.walks().then(|| BounceQueue::new(self.world)),
         }
     }
 }
@@ -76,6 +78,8 @@ pub struct TileTracer<'a, L: SimdFloat> {
     candidates: Option<&'a TileCandidates>,
     pixels: PixelBlock<L::Scalar>,
     radiance: Radiance<L>,
+    /// Paths of diffuse bounces, if packets wait for them.
+    queue: Option<BounceQueue<L>>,
 }
 
 impl<L: SimdFloat> TileTracer<'_, L> {
@@ -88,7 +92,11 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         for i in 0..self.pixels.len() {
             let (key, corner_direction) = self.pixels.broadcast(i);
             self.trace(corner_direction, &block.for_pixel(key), L::mask(true));
-            sink(i..i + 1, &mut self.radiance);
+            let done = self.finished(i + 1 == self.pixels.len());
+            for (number, i) in (i + 1 - done..=i).enumerate() {
+                self.restore(number);
+                sink(i..i + 1, &mut self.radiance);
+            }
         }
     }
 
@@ -103,11 +111,32 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         mut sink: impl FnMut(Range<usize>, &mut Radiance<L>),
     ) {
         let block = self.sampler.block(first, COUNT);
-        for pixels in self.pixels.packets(L::WIDTH / COUNT) {
+        let packets = self.pixels.packets(L::WIDTH / COUNT);
+        for (i, pixels) in packets.clone().enumerate() {
             let (keys, corner_directions) = self.pixels.gather::<L, COUNT>(pixels.start);
             let active = first_lanes::<L>(pixels.len() * COUNT);
             self.trace(corner_directions, &block.for_pixels(keys), active);
-            sink(pixels, &mut self.radiance);
+            let done = self.finished(pixels.end == self.pixels.len());
+            for (number, pixels) in packets.clone().skip(i + 1 - done).take(done).enumerate() {
+                self.restore(number);
+                sink(pixels, &mut self.radiance);
+            }
+        }
+    }
+
+    /// Returns the number of packets that are complete: the last one that was traced, or the last ones
+    /// if they waited for their paths in the queue. `is_last` is `true` at the last packet.
+    #[inline(always)]
+    fn finished(&mut self, is_last: bool) -> usize {
+        let Some(queue) = &mut self.queue else { return 1 };
+        queue.finished(self.world, self.sampler, (is_last, &mut self.radiance))
+    }
+
+    /// Restores the radiance of packet number `number` among those that are complete.
+    #[inline(always)]
+    fn restore(&mut self, number: usize) {
+        if let Some(queue) = &self.queue {
+            queue.restore(number, self.world.info.scales.len(), &mut self.radiance);
         }
     }
 
@@ -133,14 +162,7 @@ impl<L: SimdFloat> TileTracer<'_, L> {
             let (x, y, _) = disk(u, v);
             path.ray = camera.lens_rays(lens, corner_directions, offset, (x, y));
         }
-        world.trace(&mut path, self.candidates, sampler, active, &mut self.radiance);
+        let out = &mut self.radiance;
+        world.trace(&mut path, self.candidates, sampler, active, out, self.queue.as_mut());
     }
-}
-
-fn first_lanes<L: SimdFloat>(count: usize) -> L::Mask {
-    if count == L::WIDTH {
-        return L::mask(true);
-    }
-    let lanes = L::from_fn(|lane| L::Scalar::from_f64(if lane < count { 1.0 } else { 0.0 }));
-    lanes.gt(L::zero())
 }

@@ -62,6 +62,8 @@ pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
     fn to_f64(self) -> f64;
     /// Converts to an integer, rounded towards zero and clamped to the range of `u32`.
     fn to_u32(self) -> u32;
+    /// Returns `self + other`.
+    fn plus(self, other: Self) -> Self;
 }
 
 macro_rules! float {
@@ -82,6 +84,11 @@ macro_rules! float {
             #[inline(always)]
             fn to_u32(self) -> u32 {
                 self as u32
+            }
+
+            #[inline(always)]
+            fn plus(self, other: Self) -> Self {
+                self + other
             }
         }
     };

@@ -128,6 +128,13 @@ impl<L: SimdFloat> Sampler<L> {
         SampleBlock { sampler: self, index: L::SimdU32::splat(first) + within, owen_prefix }
     }
 
+    /// Creates a block of the samples with any indices `index`, for padded sets alone.
+    #[inline(always)]
+    pub fn padded_block(&self, index: L::SimdU32) -> SampleBlock<'_, L> {
+        let owen_prefix = [L::SimdU32::splat(0); DIMENSIONS];
+        SampleBlock { sampler: self, index, owen_prefix }
+    }
+
     /// Returns the scrambling key of the samples of a pixel in `replicate` 0 (A) or 1 (B). Keys are
     /// distinct for all pixels of a picture up to 65536 x 65536, because every step is a bijection
     /// of the packed coordinates.
@@ -175,6 +182,13 @@ pub struct PacketSampler<'a, L: SimdFloat> {
 }
 
 impl<L: SimdFloat> PacketSampler<'_, L> {
+    /// Returns the scrambling key and the sample index of lane `i`, with which
+    /// [`Sampler::padded_block`] and [`SampleBlock::for_pixels`] restore its padded sets.
+    #[inline(always)]
+    pub fn state(&self, i: usize) -> [u32; 2] {
+        [self.key.lane(i), self.points.index.lane(i)]
+    }
+
     /// Returns the random numbers for the segment of each path after `generation` diffuse bounces.
     /// The choices in this segment use only padded sets.
     #[inline(always)]

@@ -7,12 +7,14 @@
 //! The next generation starts at the chosen hit, in a direction whose density is the cosine to the
 //! normal, divided by pi, mixed with directions of emitters in mirrors (`lights/mirror_images.rs`).
 //! Mirrors therefore have no more noise than without diffuse bounces, and a
-//! path bounces at most once per generation.
+//! path bounces at most once per generation. In worlds with many bounces and without transmission,
+//! paths go one way at each surface after their first bounce, in full packets (`bounce_queue.rs`).
 //!
 //! Emitters and environments are sampled at every hit. A ray that starts at a diffuse bounce
 //! therefore adds nothing where it reaches an emitter or escapes to an environment.
 
 use crate::integrator::Integrator;
+use crate::integrator::bounce_queue::BounceQueue;
 use crate::integrator::coincident_surfaces::CoincidentState;
 use crate::integrator::nested_dielectrics::{MediumStack, equal};
 use crate::integrator::path::{Path, Radiance};
@@ -35,6 +37,31 @@ pub(crate) struct DiffuseLimits {
     pub depth: u32,
     /// `true` if mirrors reflect and glass transmits after a diffuse bounce.
     pub caustics: bool,
+    /// `true` if paths go one way at each surface after their first bounce.
+    pub walks: bool,
+}
+
+/// Smallest number of diffuse bounces with which paths go one way at each surface after the first. With
+/// fewer of them, the queue costs more than it saves.
+pub(crate) const MIN_WALK: u32 = 4;
+
+/// Way of paths that go one way at each surface, after their first diffuse bounce.
+#[derive(Clone, Copy)]
+pub(crate) struct Walk<L: SimdFloat> {
+    /// Number of the surface, counted from the first diffuse bounce.
+    pub step: u32,
+    /// Lanes whose limits permit another diffuse bounce.
+    pub may_bounce: L::Mask,
+    /// Lanes whose limits permit another reflection.
+    pub may_reflect: L::Mask,
+    /// Lanes that take part in Russian roulette.
+    pub may_end: L::Mask,
+    /// Lanes that go on by a diffuse bounce.
+    pub bounces: L::Mask,
+    /// Lanes that go on by a reflection.
+    pub reflects: L::Mask,
+    /// Factor of the throughput of these.
+    scale: L,
 }
 
 /// Reservoir of weighted reservoir sampling. It keeps one hit per lane, chosen from all hits of a
@@ -54,11 +81,28 @@ pub(crate) struct DiffuseReservoir<L: SimdFloat> {
     geometric: Vec3<L>,
     media: MediumStack<L>,
     coincident: Option<CoincidentState<L>>,
+    /// Way of the paths, if they go one way only; `None` in the first generation.
+    pub walk: Option<Walk<L>>,
+}
+
+impl<L: SimdFloat> Walk<L> {
+    /// Returns the walk at surface number `step` before its choice, with the lanes `may_bounce`,
+    /// `may_reflect` and `may_end`.
+    pub fn new(step: u32, [may_bounce, may_reflect, may_end]: [L::Mask; 3]) -> Self {
+        let (bounces, reflects) = (L::mask(false), L::mask(false));
+        Self { step, may_bounce, may_reflect, may_end, bounces, reflects, scale: L::one() }
+    }
 }
 
 impl<L: SimdFloat> DiffuseReservoir<L> {
+    /// Returns the reservoir of paths that go one way.
+    pub fn walking(walk: Walk<L>) -> Self {
+        Self { walk: Some(walk), ..Self::new() }
+    }
+
     fn new() -> Self {
         Self {
+            walk: None,
             offers: L::zero(),
             lanes: L::mask(false),
             sum: L::zero(),
@@ -87,7 +131,10 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         let weight = throughput.max_element();
         // A surface behind a coincident surface gets no light from lights, but has a diffuse bounce
         // like other surfaces.
-        let lanes = interaction.has_bsdf & weight.gt(L::zero());
+        let mut lanes = interaction.has_bsdf & weight.gt(L::zero());
+        if let Some(walk) = &self.walk {
+            lanes = lanes & walk.may_bounce;
+        }
         if lanes.none() {
             return lanes;
         }
@@ -119,6 +166,45 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         lanes
     }
 
+    /// Chooses one way for each path at `vertex`, in proportion to its throughput: the diffuse bounce
+    /// that was offered, or the reflection if it is `followed`. Paths that lose throughput end with
+    /// some probability (Russian roulette, Arvo and Kirk 1990).
+    #[inline(never)]
+    pub fn choose_way(&mut self, vertex: &Vertex<'_, L>, followed: L::Mask) {
+        let Some(walk) = &mut self.walk else { return };
+        let (zero, one) = (L::zero(), L::one());
+        let arriving = vertex.path.throughput.max_element();
+        let mut mirrored = zero;
+        for (index, lanes) in vertex.interaction.bsdfs(followed) {
+            let strength = vertex.world.bsdfs[index].reflection.map_or(zero, L::splat);
+            mirrored = L::select(lanes, strength * arriving, mirrored);
+        }
+        let diffuse = self.throughput.max_element().masked(self.lanes);
+        let sum = diffuse + mirrored;
+        let possible = sum.gt(zero);
+        let kept = (sum / L::select(possible, arriving, one)).min(one);
+        let kept = L::select(walk.may_end, kept, one);
+        let number = vertex.sampler.reservoir_1d(0) * sum;
+        walk.bounces = possible & number.lt(diffuse * kept);
+        walk.reflects = possible.and_not(walk.bounces) & number.lt(sum * kept) & followed;
+        walk.scale = sum / L::select(walk.reflects, mirrored * kept, one);
+        self.sum = sum / L::select(possible, kept, one);
+    }
+
+    /// Replaces the paths by those that go on, of which `path` has the reflected ones in `lanes`.
+    #[inline(never)]
+    pub fn go_on(&mut self, vertex: &mut Vertex<'_, L>, lanes: L::Mask) {
+        let Some(walk) = self.walk else { return };
+        let step = walk.step;
+        let reflects = walk.reflects & lanes;
+        let path = &mut *vertex.path;
+        path.throughput = Path::bounded(path.throughput * walk.scale);
+        let start = self.start(vertex.world, vertex.sampler.diffuse_2d(step));
+        let bounces = walk.bounces & start.lanes;
+        *path = Path::select(bounces, &start.path, path);
+        self.walk = Some(Walk { bounces, reflects, ..walk });
+    }
+
     /// Returns the rays that leave the chosen hits by a diffuse bounce.
     fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
         let (direction, ratio) = match &world.lights.mirror_images {
@@ -142,7 +228,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
 }
 
 impl<L: SimdFloat> Integrator<'_, L> {
-    /// Traces camera rays in a scene with indirect diffuse light.
+    /// Traces camera rays in a scene with indirect diffuse light. The paths of the first diffuse bounce
+    /// are added to `queue`, if there is one.
     #[inline(never)]
     pub fn trace_generations(
         &self,
@@ -150,6 +237,7 @@ impl<L: SimdFloat> Integrator<'_, L> {
         ray: Ray<L>,
         active: L::Mask,
         out: &mut Radiance<L>,
+        queue: Option<&mut BounceQueue<L>>,
     ) {
         let world = self.world;
         let mut start = Branch::camera(ray, active);
@@ -180,6 +268,9 @@ impl<L: SimdFloat> Integrator<'_, L> {
                 break;
             }
             out.counts.glossy = true;
+            if let Some(queue) = queue {
+                return queue.push(start.path, start.lanes, sampler);
+            }
             candidates = &world.culling.all_candidates;
             depth = if limits.caustics { world.depth } else { 0 };
         }

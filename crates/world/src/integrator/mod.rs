@@ -2,6 +2,7 @@
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
+pub(crate) mod bounce_queue;
 mod box_tree;
 pub(crate) mod clear_panes;
 pub(crate) mod coincident_surfaces;
@@ -20,11 +21,12 @@ mod transmission;
 mod vertex;
 
 use crate::culling::tile::TileCandidates;
+use crate::integrator::bounce_queue::BounceQueue;
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::world::World;
 use zerkalo_kernel::lanes::{Double, SimdFloat, Single, Vec3};
-use zerkalo_kernel::sampling::PacketSampler;
+use zerkalo_kernel::sampling::{PacketSampler, Sampler};
 
 /// Inputs that all paths of a packet share.
 #[derive(Clone, Copy)]
@@ -41,7 +43,8 @@ pub(crate) struct Integrator<'a, L: SimdFloat> {
 impl<L: SimdFloat> World<L> {
     /// Traces one packet of paths from the camera, and overwrites `path`. Lanes outside `active`
     /// stay black. `candidates` are the primitives that the camera rays and the shadow rays from
-    /// their hit points are tested against; `None` means all primitives.
+    /// their hit points are tested against; `None` means all primitives. `queue` gets the paths of
+    /// diffuse bounces, if there is one; they are black without [`BounceQueue::finish`].
     #[inline(always)]
     pub fn trace(
         &self,
@@ -50,6 +53,7 @@ impl<L: SimdFloat> World<L> {
         sampler: &PacketSampler<'_, L>,
         active: L::Mask,
         out: &mut Radiance<L>,
+        queue: Option<&mut BounceQueue<L>>,
     ) {
         for group in &mut out.groups[..self.info.scales.len()] {
             *group = Vec3::zero();
@@ -57,7 +61,7 @@ impl<L: SimdFloat> World<L> {
         let candidates = candidates.unwrap_or(&self.culling.all_candidates);
         let integrator = Integrator { world: self, sampler, candidates, depth: self.depth };
         if let Some(limits) = self.diffuse_limits {
-            integrator.trace_generations(limits, path.ray, active, out);
+            integrator.trace_generations(limits, path.ray, active, out, queue);
         } else if let Some(nested_dielectrics) = &self.nested_dielectrics {
             let mut start = Branch::camera(path.ray, active);
             nested_dielectrics.add_at_start(&path.ray, &mut start.media);
@@ -80,10 +84,15 @@ type Trace<L> = fn(
     &PacketSampler<'_, L>,
     <L as SimdFloat>::Mask,
     &mut Radiance<L>,
+    Option<&mut BounceQueue<L>>,
 );
 
-/// [`World::trace`] in both precisions. No code reads this static: it makes the compiler generate
+/// Type of [`BounceQueue::finish`] for the SIMD type `L`.
+type Finish<L> = fn(&mut BounceQueue<L>, &World<L>, &Sampler<L>, &mut Radiance<L>);
+
+/// [`World::trace`] and [`BounceQueue::finish`] in both precisions. No code reads this static: it makes the compiler generate
 /// the machine code of the kernels in this crate, so that other crates call it instead of
 /// generating their own.
 #[doc(hidden)]
-pub static KERNELS: (Trace<Single>, Trace<Double>) = (World::trace, World::trace);
+pub static KERNELS: (Trace<Single>, Trace<Double>, Finish<Single>, Finish<Double>) =
+    (World::trace, World::trace, BounceQueue::finish, BounceQueue::finish);

@@ -54,14 +54,24 @@ impl<L: SimdFloat> Integrator<'_, L> {
             if !SIMPLE && let Some(reservoir) = &mut reservoir {
                 bouncing = Some(reservoir.offer(&vertex, &MediumStack::vacuum(), None));
             }
-            vertex.shade::<SIMPLE>(&hit, bouncing, |_| {
-                let lanes = if is_last { L::mask(false) } else { interaction.reflecting };
-                ReflectedRays { lanes, share: L::one() }
+            let walks = reservoir.as_ref().and_then(|reservoir| reservoir.walk);
+            let mut followed = if is_last { L::mask(false) } else { interaction.reflecting };
+            if !SIMPLE && let Some(walk) = walks {
+                followed = followed & walk.may_reflect;
+            }
+            vertex.shade::<SIMPLE>(&hit, bouncing, |_| ReflectedRays {
+                lanes: followed,
+                share: L::one(),
             });
-            if is_last || interaction.reflecting.none() {
+            if !SIMPLE && let (Some(_), Some(reservoir)) = (walks, &mut reservoir) {
+                reservoir.choose_way(&vertex, followed);
+            } else if is_last || interaction.reflecting.none() {
                 return;
             }
             active = vertex.sample_reflection::<SIMPLE>();
+            if !SIMPLE && let (Some(_), Some(reservoir)) = (walks, &mut reservoir) {
+                return reservoir.go_on(&mut vertex, active);
+            }
             if active.none() {
                 return;
             }
