@@ -66,8 +66,8 @@ impl<S: Float> Paths<S> {
             let own: [S; MAX_WIDTH] = array_from_fn(|i| value.lane(i % L::WIDTH));
             let packed = L::gather(&own, &lanes);
             if let Some(part) = column[first..].first_chunk_mut::<MAX_WIDTH>() {
-                for i in 0..L::WIDTH {
-                    part[i] = packed.lane(i);
+                for (i, value) in part[..L::WIDTH].iter_mut().enumerate() {
+                    *value = packed.lane(i);
                 }
             }
         }
