@@ -213,9 +213,8 @@ impl EffectRunner {
         signals: &Receiver<SignalEvent>,
     ) -> Result<Option<PathBuf>, String> {
         let editing = self.editing.as_mut();
-        let (kept, resized) = editing.map_or((Ok(None), None), |editing| {
-            (editing.files.finish(), editing.resized.take())
-        });
+        let (kept, resized) = editing
+            .map_or((Ok(None), None), |editing| (editing.files.finish(), editing.resized.take()));
         // The session runs exports in the order of their requests, so that waiting for the last one
         // suffices. A panic of its thread drops the sender, too.
         let writing = self.exporting.take().into_iter().chain(resized.and_then(ResizedExport::end));

@@ -29,6 +29,10 @@ impl OpenTerminal {
     }
 }
 
+/// Loaded value, with the terminal if it is in full-screen use by then; or, if the user has quit or
+/// a signal has arrived, the exit status of the signal.
+type Loaded<T> = Result<(T, Option<OpenTerminal>), Option<u8>>;
+
 /// Name of the scene or films being loaded, and messages, for the terminal.
 pub struct Loading {
     pub name: String,
@@ -37,14 +41,12 @@ pub struct Loading {
 }
 
 impl Loading {
-    /// Runs `load` in a thread of its own. Returns its result, with the terminal if that is in
-    /// full-screen use by then. If the user quits or a signal arrives, returns the exit status of
-    /// the signal as an error.
+    /// Runs `load` in a thread of its own, until it returns, the user quits or a signal arrives.
     pub(super) fn run<T: Send + 'static>(
         self,
         load: impl FnOnce() -> T + Send + 'static,
         environment: &Environment,
-    ) -> io::Result<Result<(T, Option<OpenTerminal>), Option<u8>>> {
+    ) -> io::Result<Loaded<T>> {
         let (sender, loaded) = bounded(1);
         let load = move || drop(sender.send(load()));
         std::thread::Builder::new().name("load".into()).spawn(load)?;
