@@ -534,7 +534,8 @@ mod tests {
                 let point = DVec3::new(x, y, z);
                 point.cmpge(low - 1e-13).all() && point.cmple(high + 1e-13).all()
             };
-            let wanted = |b: &u32| *b != a as u32 && (a % 2 == 0 || b % 2 == 0) && near(b);
+            let wanted =
+                |b: &u32| *b != a as u32 && (a.is_multiple_of(2) || b.is_multiple_of(2)) && near(b);
             assert_eq!(found, (0..200).filter(wanted).collect::<Vec<_>>());
             count += found.len();
         }
