@@ -29,8 +29,9 @@ impl OpenTerminal {
     }
 }
 
-/// What was loaded, and the terminal if it is in full-screen use by then.
-type Loaded<T> = (T, Option<OpenTerminal>);
+/// Loaded value, with the terminal if it is in full-screen use by then; or, if the user has quit or
+/// a signal has arrived, the exit status of the signal.
+type Loaded<T> = Result<(T, Option<OpenTerminal>), Option<u8>>;
 
 /// Name of the scene or films being loaded, and messages, for the terminal.
 pub struct Loading {
@@ -40,13 +41,12 @@ pub struct Loading {
 }
 
 impl Loading {
-    /// Runs `load` in a thread of its own and returns its result. If the user quits or a signal
-    /// arrives, returns the exit status of the signal as an error.
+    /// Runs `load` in a thread of its own, until it returns, the user quits or a signal arrives.
     pub(super) fn run<T: Send + 'static>(
         self,
         load: impl FnOnce() -> T + Send + 'static,
         environment: &Environment,
-    ) -> io::Result<Result<Loaded<T>, Option<u8>>> {
+    ) -> io::Result<Loaded<T>> {
         let (sender, loaded) = bounded(1);
         let load = move || drop(sender.send(load()));
         std::thread::Builder::new().name("load".into()).spawn(load)?;
