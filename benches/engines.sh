@@ -55,6 +55,17 @@ equal() {
 
 echo "$(uname -sr), $(nproc) cores, zerkalo $("$ZERKALO" --version | cut -d' ' -f2)"
 
+# Number of the task that runs on the node $1, as soon as there is one.
+task_on() {
+    local task=""
+    until [ -n "$task" ]; do
+        squeue -h | grep -q . || { echo "the job has ended already; use a larger SIZE" >&2; return 1; }
+        sleep 0.2
+        task="$(squeue -h -t R -w "$1" -o %K)"
+    done
+    echo "$task"
+}
+
 wait_for_jobs() {
     while squeue -h -o '%i %T %r' | grep -q .; do
         squeue -h -o '%i %T %r' > "$work/queue"
@@ -149,14 +160,12 @@ slurm() {
     say "kill -9 of a worker"
     kill -9 "$(workers slurm | head -n 1)"
 
-    task=""
-    until [ -n "$task" ]; do sleep 1; task="$(squeue -h -t R -w node2 -o %K)"; done
+    task="$(task_on node2)"
     say "node2 is drained, and its task (worker $task) put back into the queue"
     scontrol update NodeName=node2 State=DRAIN Reason=maintenance
     scontrol requeue "${array}_$task"
 
-    task=""
-    until [ -n "$task" ]; do sleep 1; task="$(squeue -h -t R -w node3 -o %K)"; done
+    task="$(task_on node3)"
     # All processes of the node at once: daemon, job step, script, worker.
     say "node3 is lost (slurmd, task and worker $task are killed)"
     local script step
