@@ -23,9 +23,6 @@ use zerkalo_terminal::Environment;
 
 pub fn run(args: &EditArgs, preferences: Preferences) -> Result<(), Failure> {
     let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
-    if let Some(reason) = args.scene.as_deref().and_then(no_scene) {
-        return Err(Failure::Usage(reason));
-    }
     let environment = terminal_environment(&format!(
         "`zerkalo render {scene} -o PICTURE.png` renders without one"
     ))?;
@@ -43,6 +40,9 @@ pub fn run(args: &EditArgs, preferences: Preferences) -> Result<(), Failure> {
 
 /// Reads the scene or the checkpoint of `args`.
 fn setup(args: &EditArgs, assets: Arc<Assets>) -> Result<Setup, Failure> {
+    if let Some(reason) = args.scene.as_deref().and_then(no_scene) {
+        return Err(Failure::Failed(reason));
+    }
     let state = state_folder(|name| env::var_os(name));
     let film = args.scene.as_deref().filter(|path| is_film_file(path));
     let checkpoint = film.map(Checkpoint::read).transpose()?;

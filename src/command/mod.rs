@@ -138,7 +138,7 @@ fn parse(mut command: clap::Command) -> Cli {
         if error.kind() == ErrorKind::MissingRequiredArgument
             && [".png", ".exr"].iter().any(|extension| last.ends_with(extension))
         {
-            let what = format!("`-o {last}` writes the picture to this file");
+            let what = format!("`-o {last}`, short for --output, writes the picture to this file");
             end(&Cli::command().error(error.kind(), what))
         }
         let kinds = [ErrorKind::ArgumentConflict, ErrorKind::UnknownArgument];
