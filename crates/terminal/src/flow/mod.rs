@@ -429,10 +429,11 @@ impl FlowControl {
     }
 
     /// Returns the number of bytes in the send queue above which no frame is sent: those that the
-    /// connection transmits in one round trip plus [`FRAME_SPAN`].
+    /// connection transmits in one round trip plus [`FRAME_SPAN`], and at least two of the smallest
+    /// frames. A single one would fill the queue until it is acknowledged.
     fn max_queue(&self) -> f64 {
         let time = self.round_trip.unwrap_or(DEFAULT_ROUND_TRIP) + FRAME_SPAN;
-        (self.proven_rate() * time.as_secs_f64()).max(BUDGET[0])
+        (self.proven_rate() * time.as_secs_f64()).max(2.0 * BUDGET[0])
     }
 
     /// Returns the rate without the growth of the send queue's rate since its last measurement.

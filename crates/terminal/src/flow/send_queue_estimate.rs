@@ -54,8 +54,9 @@ pub struct SendQueueEstimate {
     frames: VecDeque<(Duration, f64)>,
     busy: Option<Busy>,
     is_full: bool,
-    /// Time at which the queue was last full.
+    /// Times at which the queue was last full and last empty.
     full_at: Duration,
+    empty_at: Duration,
     /// Times at which the queue became full since the connection may have been idle, and numbers of
     /// bytes that had left it in total. A relay may offer room before it is full, so that it holds
     /// fewer bytes at the first of these times than at the others.
@@ -245,6 +246,7 @@ impl SendQueueEstimate {
         let alone = alone.map(|bytes| LoneFrame { bytes, round_trip: now - busy.since });
         if bytes == 0 {
             self.busy = None;
+            self.empty_at = now;
         }
         // At first, the limit follows from the frames: the queue should empty in a round trip.
         let limit = if self.settled_rate.is_finite() { limit } else { limit.min(recent) };
@@ -269,6 +271,10 @@ impl SendQueueEstimate {
         self.fills.retain(|(at, _)| now <= *at + longest);
         let &(since, before) = self.fills.get(usize::from(is_first || self.fills.len() > 2))?;
         let span = now - since;
-        (span >= SHORTEST_SAMPLE).then(|| ((drained - before) / span.as_secs_f64(), span))
+        let rate = (drained - before) / span.as_secs_f64();
+        // Without a relay, an empty queue means that the frames, not the connection, limit the rate.
+        let has_relay = now < self.learns_until || self.has_relay(self.settled_rate);
+        let is_idle = self.empty_at > since && !is_first && !has_relay;
+        (span >= SHORTEST_SAMPLE && !(is_idle && rate < self.settled_rate)).then_some((rate, span))
     }
 }
