@@ -44,7 +44,7 @@ const STORIES: &[Story] = &[
     ("zerkalo render scene.toml :lamp $S -o a.png", 2, "", "several scenes and one file, a.png"),
     ("zerkalo render scene.toml :lamp $S -o %d.png --stats s.json", 2, "", "one file, s.json"),
     // Built-in scenes.
-    ("zerkalo scenes", 0, "lamp-and-mirror   A lamp before a mirror", ""),
+    ("zerkalo scenes", 0, "lamp-and-mirror  A lamp before a mirror", ""),
     ("zerkalo scenes lamp copy.toml && zerkalo check copy.toml", 0, "copy.toml: valid", "*"),
     ("zerkalo scenes lamp copy.toml", 1, "", "there is such a file already"),
     (
