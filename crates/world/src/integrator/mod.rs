@@ -44,7 +44,7 @@ impl<L: SimdFloat> World<L> {
     /// Traces one packet of paths from the camera, and overwrites `path`. Lanes outside `active`
     /// stay black. `candidates` are the primitives that the camera rays and the shadow rays from
     /// their hit points are tested against; `None` means all primitives. `queue` gets the paths of
-    /// diffuse bounces, if there is one; they are black without [`BounceQueue::finish`].
+    /// diffuse bounces, if there is one; they are black without `BounceQueue::finish`.
     #[inline(always)]
     pub fn trace(
         &self,
@@ -87,10 +87,10 @@ type Trace<L> = fn(
     Option<&mut BounceQueue<L>>,
 );
 
-/// Type of [`BounceQueue::finish`] for the SIMD type `L`.
+/// Type of `BounceQueue::finish` for the SIMD type `L`.
 type Finish<L> = fn(&mut BounceQueue<L>, &World<L>, &Sampler<L>, &mut Radiance<L>);
 
-/// [`World::trace`] and [`BounceQueue::finish`] in both precisions. No code reads this static: it makes the compiler generate
+/// [`World::trace`] and `BounceQueue::finish` in both precisions. No code reads this static: it makes the compiler generate
 /// the machine code of the kernels in this crate, so that other crates call it instead of
 /// generating their own.
 #[doc(hidden)]
