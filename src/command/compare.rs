@@ -224,3 +224,30 @@ fn difference_png(a: &Picture, b: &Picture, rmse: f64) -> Result<Vec<u8>, Failur
     let pixels: Vec<u8> = pixels.collect();
     Ok(png_of_rgb(a.size.map(|n| n as u32), &pixels, None)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns a picture of noise of one level, to which `shift` is added in its first block.
+    fn picture(seed: u32, shift: f64) -> Picture {
+        let size = [8 * BLOCK, 8 * BLOCK];
+        let level = |i: usize| {
+            let hash = (i as u32 ^ seed).wrapping_mul(0x9e37_79b9);
+            let noise =
+                if (hash ^ hash >> 15).wrapping_mul(0x85eb_ca6b) >> 31 == 0 { -1.0 } else { 1.0 };
+            let is_first = i % size[0] < BLOCK && i / size[0] < BLOCK;
+            [100.0 + noise + if is_first { shift } else { 0.0 }; 3]
+        };
+        let levels: Vec<[f64; 3]> = (0..size[0] * size[1]).map(level).collect();
+        let noise = Some(ByMeasure { linear: 0.01, levels: 1.0 });
+        Picture { size, linear: Some(levels.clone()), levels, noise }
+    }
+
+    #[test]
+    fn shift_of_a_block_is_a_difference() {
+        let agree = |shift| compare(&picture(1 << 16, 0.0), &picture(1 << 20, shift)).agree;
+        assert_eq!(agree(0.0), Some(true));
+        assert_eq!(agree(1.5), Some(false));
+    }
+}

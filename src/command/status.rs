@@ -26,16 +26,17 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
     let [complete, late] = [WatchedState::Complete, WatchedState::Late].map(is);
     let finished = job.is_finished();
     let (rays, base) = (files.rays(), settings.base_rays);
-    let (share, hours) = match settings.total_rays {
-        _ if finished => (Some(1.0), Some(0.0)),
-        total if total > 0.0 => {
+    let total = settings.total_rays;
+    let (share, hours) = match (finished, total > 0.0) {
+        (true, _) => (Some(1.0), Some(0.0)),
+        (false, true) => {
             let planned = std::fs::metadata(&job.path)?.modified()?;
             let seconds = now.duration_since(planned).unwrap_or_default().as_secs_f64();
-            let rate = (rays - base) as f64 / seconds.max(1.0);
+            let rate = rays.saturating_sub(base) as f64 / seconds.max(1.0);
             let left = (total - rays as f64).max(0.0);
             (Some((rays as f64 / total).min(1.0)), (rate > 0.0).then(|| left / rate / 3600.0))
         }
-        _ => (None, None),
+        (false, false) => (None, None),
     };
     if args.json.json {
         return print_json(&json!({

@@ -129,7 +129,7 @@ impl<L: SimdFloat> TileTracer<'_, L> {
     #[inline(always)]
     fn finished(&mut self, is_last: bool) -> usize {
         let Some(queue) = &mut self.queue else { return 1 };
-        queue.finished(self.world, self.sampler, (is_last, &mut self.radiance))
+        queue.finished(self.world, self.sampler, is_last, &mut self.radiance)
     }
 
     /// Restores the radiance of packet number `number` among those that are complete.

@@ -1,7 +1,8 @@
 //! Render of the samples of one shard, in steps between which the film can be saved.
 
-use crate::film::file::{FilmFileHeader, FilmReader};
+use crate::film::file::{FilmFileHeader, FilmReader, tile_record};
 use crate::film::{Header, TILE, TILE_PIXELS};
+use crate::plan::share_report::{CUTS_TAG, REPORT_TAG, encode_noise};
 use crate::plan::{Plan, PlannedTile, Share, ShareReport, TileReport};
 use crate::schedule::{Interval, SAMPLE_ALIGNMENT, Spp};
 use crate::session::{Report, State};
@@ -191,12 +192,29 @@ impl ShardRender {
     }
 
     /// Adds the report on the tiles to the header of the part, which becomes that of a film of the
-    /// whole picture.
+    /// whole picture. If the part is `complete`, the report has the errors of its tiles and the sums
+    /// of cut tiles.
     pub fn record(&self, header: &mut FilmFileHeader, complete: bool) {
         header.film = self.picture.clone();
-        let end = |tile: usize| self.planned[tile - self.share.first].end;
-        let film = (&self.state.film, self.offset, self.state.estimator());
-        self.report.record(header, &self.share, end, complete, film);
+        let first = self.share.first;
+        let mut out = (first as u32).to_le_bytes().to_vec();
+        let mut cuts = Vec::new();
+        let tiles = (first..).zip(&self.share.ranges).zip(&self.planned).zip(&self.report.tiles);
+        for (((number, range), planned), tile) in tiles {
+            let is_whole = *range == (0..planned.end);
+            let held = self.state.film.tile(number - self.offset);
+            let estimator = self.state.estimator();
+            let error = held.filter(|_| complete && is_whole).and_then(|t| estimator.tile(t));
+            out.extend(tile.rays.to_le_bytes());
+            out.extend([u8::from(tile.glossy), u8::from(error.is_some())]);
+            error.iter().for_each(|error| encode_noise(error, &mut out));
+            if complete && !is_whole {
+                cuts.extend((number as u32).to_le_bytes());
+                tile_record::encode(held, &mut cuts);
+            }
+        }
+        header.chunks.insert(REPORT_TAG, out);
+        header.chunks.insert(CUTS_TAG, cuts);
     }
 
     /// Returns the reports on the tiles, without errors.

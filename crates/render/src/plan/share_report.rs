@@ -2,8 +2,7 @@
 //! The planner therefore reads no films.
 
 use crate::film::file::{Fields, FilmFileHeader, tile_record};
-use crate::film::{ByMeasure, Captures, Estimator, Film, Tile, TileNoise};
-use crate::plan::Share;
+use crate::film::{ByMeasure, Captures, Estimator, Tile, TileNoise};
 use std::collections::BTreeMap;
 
 /// Tag of the chunk with the report: the number of the first tile (u32), then a record of each tile:
@@ -33,34 +32,6 @@ pub struct ShareReport {
 }
 
 impl ShareReport {
-    /// Adds the report to the header of a part. `film` begins with tile `offset` of the picture.
-    /// If the part is `complete`, the errors of its tiles and the sums of cut tiles are added.
-    pub fn record(
-        &self,
-        header: &mut FilmFileHeader,
-        share: &Share,
-        ends: impl Fn(usize) -> u32,
-        complete: bool,
-        (film, offset, estimator): (&Film, usize, &Estimator),
-    ) {
-        let mut out = (self.first as u32).to_le_bytes().to_vec();
-        let mut cuts = Vec::new();
-        for ((number, range), tile) in (self.first..).zip(&share.ranges).zip(&self.tiles) {
-            let is_whole = *range == (0..ends(number));
-            let held = film.tile(number - offset);
-            let error = held.filter(|_| complete && is_whole).and_then(|t| estimator.tile(t));
-            out.extend(tile.rays.to_le_bytes());
-            out.extend([u8::from(tile.glossy), u8::from(error.is_some())]);
-            error.iter().for_each(|error| encode_noise(error, &mut out));
-            if complete && !is_whole {
-                cuts.extend((number as u32).to_le_bytes());
-                tile_record::encode(held, &mut cuts);
-            }
-        }
-        header.chunks.insert(REPORT_TAG, out);
-        header.chunks.insert(CUTS_TAG, cuts);
-    }
-
     /// Reads the report in the header of a part. Returns `None` if there is none.
     pub fn of_header(header: &FilmFileHeader) -> Option<Self> {
         let mut fields = Fields::new(header.chunks.get(&REPORT_TAG)?);
@@ -122,7 +93,7 @@ impl RoundReport {
     }
 }
 
-fn encode_noise(noise: &TileNoise, out: &mut Vec<u8>) {
+pub(super) fn encode_noise(noise: &TileNoise, out: &mut Vec<u8>) {
     for pair in [noise.reported, noise.allocation, noise.squares] {
         [pair.linear, pair.levels].iter().for_each(|value| out.extend(value.to_le_bytes()));
     }

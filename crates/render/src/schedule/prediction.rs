@@ -14,11 +14,9 @@ pub const USUAL_SLOPE: f64 = 0.7;
 /// Number of earlier estimates of a tile that a plan keeps, from which slopes are fitted.
 pub const EARLIER: usize = 2;
 
-/// Excess of the error over its target, as a share, with which a plan ends.
+/// Excess of the error over its target, as a share, with which a plan ends. A round that misses the
+/// target by more is followed by a small one.
 const TOLERANCE: f64 = 0.02;
-/// Error at which a round of a plan aims, as a share of the target. A round that misses it by more
-/// than [`TOLERANCE`] is followed by a small one.
-const AIM: f64 = 1.0;
 /// Growth of all rays up to which a round is the last one. The error model of a tile misses by a
 /// few per cent for each doubling of its samples.
 const LAST_GROWTH: f64 = 1.5;
@@ -33,12 +31,15 @@ const TILE_GROWTH: u32 = 16;
 /// End of a prediction: the first of its limits that is reached.
 #[derive(Clone, Copy, Debug)]
 pub struct Goal {
-    /// Error at which the prediction aims, as a share of the target.
-    pub aim: f64,
     /// Largest expected number of rays, in addition to those traced.
     pub rays: f64,
     /// Largest growth of the samples of a tile.
     pub growth: u32,
+}
+
+impl Goal {
+    /// No limit but the target.
+    pub const TO_TARGET: Self = Self { rays: f64::INFINITY, growth: u32::MAX };
 }
 
 /// Predicted end of a render.
@@ -131,8 +132,7 @@ impl Schedule {
         if criterion.of(self.noise?.rmse) <= (1.0 + TOLERANCE) * target {
             return None;
         }
-        let to_target = Goal { aim: AIM, rays: f64::INFINITY, growth: u32::MAX };
-        let mut round = self.predict(usual_slopes, to_target)?;
+        let mut round = self.predict(usual_slopes, Goal::TO_TARGET)?;
         let (traced, rest) = (self.rays as f64, round.rays);
         let growth = 1.0 + rest / traced;
         if self.common_count() < self.min_samples() {
@@ -142,8 +142,7 @@ impl Schedule {
         } else if growth > LAST_GROWTH {
             let share = if growth <= SECOND_GROWTH { SECOND_SHARE } else { growth.powf(-0.5) };
             let rays = share * (traced + rest) - traced;
-            let goal = Goal { rays, growth: TILE_GROWTH, ..to_target };
-            round = self.predict(usual_slopes, goal)?;
+            round = self.predict(usual_slopes, Goal { rays, growth: TILE_GROWTH })?;
         }
         let grows = round.tiles.iter().any(|tile| tile.end > tile.base);
         grows.then_some((round, traced + rest))
@@ -156,7 +155,6 @@ impl Schedule {
     pub fn predict(&self, usual_slopes: [f64; 2], goal: Goal) -> Option<Prediction> {
         let (criterion, target) = self.target()?;
         let rmse = criterion.of(self.noise?.rmse);
-        let target = goal.aim * target;
         let slopes = [false, true]
             .map(|glossy| self.fitted_slope(glossy).unwrap_or(usual_slopes[usize::from(glossy)]));
         let expected = self.calibrated(&self.tile_models(slopes));

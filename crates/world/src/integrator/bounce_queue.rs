@@ -50,14 +50,15 @@ impl<S: Float> Paths<S> {
         Self { count: 0, floats, integers: Box::new([[0; CAPACITY]; 3]) }
     }
 
-    /// Adds the first `count` of the `lanes` of `paths` and of `integers`.
+    /// Adds the lanes `mask` of `paths` and of `integers`.
     #[inline(always)]
     fn push<L: SimdFloat<Scalar = S>>(
         &mut self,
         paths: &QueuedPaths<L>,
         integers: &[[u32; MAX_WIDTH]; 3],
-        (lanes, count): ([u32; MAX_WIDTH], usize),
+        mask: L::Mask,
     ) {
+        let (lanes, count) = lanes_of(mask);
         let Path { ray: Ray { origin: o, direction: d }, throughput: t, lobe_pdf, .. } = paths.path;
         let QueuedPaths { bounces, reflections, .. } = *paths;
         let floats = [o.x, o.y, o.z, d.x, d.y, d.z, t.x, t.y, t.z, lobe_pdf, bounces, reflections];
@@ -164,7 +165,7 @@ impl<L: SimdFloat> BounceQueue<L> {
                 _ => (first + lane) as u32,
             })
         };
-        self.paths.push(&paths, &array_from_fn(integer), lanes_of(lanes));
+        self.paths.push(&paths, &array_from_fn(integer), lanes);
     }
 
     /// Keeps the radiance `last` of the packet that was traced last. Returns the number of packets that
@@ -174,7 +175,8 @@ impl<L: SimdFloat> BounceQueue<L> {
         &mut self,
         world: &World<L>,
         sampler: &Sampler<L>,
-        (is_last, last): (bool, &mut Radiance<L>),
+        is_last: bool,
+        last: &mut Radiance<L>,
     ) -> usize {
         let groups = world.info.scales.len();
         self.batch[self.traced * groups..][..groups].copy_from_slice(&last.groups[..groups]);
@@ -206,8 +208,8 @@ impl<L: SimdFloat> BounceQueue<L> {
                 let block = sampler.padded_block(L::SimdU32::from_fn(|i| indices[i]));
                 let sampler = block.for_pixels(L::SimdU32::from_fn(|i| keys[i])).generation(step);
                 let active = first_lanes::<L>(count);
-                let lanes = world.walk(&mut paths, (active, step), &sampler, scratch);
-                self.next.push(&paths, &integers, lanes_of(lanes));
+                let lanes = world.walk(&mut paths, active, step, &sampler, scratch);
+                self.next.push(&paths, &integers, lanes);
                 for (group, value) in scratch.groups[..groups].iter().enumerate() {
                     let bright = active.and_not(value.max_element().le(L::zero()));
                     let (lanes, bright) = lanes_of(bright);
@@ -247,7 +249,8 @@ impl<L: SimdFloat> World<L> {
     fn walk(
         &self,
         paths: &mut QueuedPaths<L>,
-        (active, step): (L::Mask, u32),
+        active: L::Mask,
+        step: u32,
         sampler: &PacketSampler<'_, L>,
         out: &mut Radiance<L>,
     ) -> L::Mask {

@@ -208,7 +208,7 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     /// Returns the rays that leave the chosen hits by a diffuse bounce.
     fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
         let (direction, ratio) = match &world.lights.mirror_images {
-            Some(images) => images.sample_bounce((self.origin, self.normal), (u, v)),
+            Some(images) => images.sample_bounce(self.origin, self.normal, u, v),
             None => (Frame::around(self.normal).to_world(cosine_hemisphere(u, v)), L::one()),
         };
         // The throughput is divided by the probability of the choice, weight / sum.

@@ -90,9 +90,9 @@ type Trace<L> = fn(
 /// Type of `BounceQueue::finish` for the SIMD type `L`.
 type Finish<L> = fn(&mut BounceQueue<L>, &World<L>, &Sampler<L>, &mut Radiance<L>);
 
-/// [`World::trace`] and `BounceQueue::finish` in both precisions. No code reads this static: it makes the compiler generate
-/// the machine code of the kernels in this crate, so that other crates call it instead of
-/// generating their own.
+/// [`World::trace`] and `BounceQueue::finish` in both precisions. No code reads this static: it
+/// makes the compiler generate the machine code of the kernels in this crate, so that other crates
+/// call it instead of generating their own.
 #[doc(hidden)]
 pub static KERNELS: (Trace<Single>, Trace<Double>, Finish<Single>, Finish<Double>) =
     (World::trace, World::trace, BounceQueue::finish, BounceQueue::finish);

@@ -142,10 +142,8 @@ impl<S: Float> MirrorImage<S> {
         let (center, radius) = (Vec3::splat(self.mirror.0), L::splat(self.mirror.1));
         let to_image = Vec3::splat(self.image.0) - point;
         let image_radius = L::splat(self.image.1);
-        let (distance2, inverse) = {
-            let distance2 = to_image.length_squared();
-            (distance2, one / distance2.sqrt())
-        };
+        let distance2 = to_image.length_squared();
+        let inverse = one / distance2.sqrt();
         let height = (point - center).dot(Vec3::splat(self.normal));
         // The line to the centre of the image meets the plane of the mirror in this fraction of it.
         let fraction = height / (height + L::splat(self.height));
@@ -189,8 +187,10 @@ impl<S: Float> MirrorImages<S> {
     #[inline(never)]
     pub fn sample_bounce<L: SimdFloat<Scalar = S>>(
         &self,
-        (point, normal): (Vec3<L>, Vec3<L>),
-        (u, v): (L, L),
+        point: Vec3<L>,
+        normal: Vec3<L>,
+        u: L,
+        v: L,
     ) -> (Vec3<L>, L) {
         let (zero, one) = (L::zero(), L::one());
         let nothing = Seen { weight: zero, axis: normal, one_minus_cos: zero };
@@ -257,7 +257,7 @@ mod tests {
         let n = 200;
         for i in 0..n * n {
             let [u, v] = [i / n, i % n].map(|k| (f64::from(k) + 0.5) / f64::from(n));
-            let (direction, ratio) = images.sample_bounce((Vec3::zero(), normal), (u, v));
+            let (direction, ratio) = images.sample_bounce(Vec3::zero(), normal, u, v);
             let direction = DVec3::new(direction.x, direction.y, direction.z);
             mean += direction * ratio;
             weights += ratio;
