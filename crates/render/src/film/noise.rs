@@ -46,6 +46,9 @@ use crate::film::{Captures, Stratum, TILE, TILE_PIXELS};
 use std::collections::BTreeMap;
 use zerkalo_scene::Tone;
 
+/// Least radiance, in units of white, of a pixel that shows a lamp.
+const LEAST_LAMP: f64 = 1.0;
+
 /// Pair of numbers, one for each of the two measures of error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ByMeasure {
@@ -84,6 +87,9 @@ pub struct TileNoise {
     pub squares: ByMeasure,
     /// Pixels that rare bright samples have hit, black and white.
     pub captures: [Captures; 2],
+    /// Squared error, in 8-bit levels and summed over channels, of a pixel at the edge of a lamp in
+    /// which no sample has hit the lamp; the largest of the tile, 0 if there is none.
+    pub sliver: f32,
     /// Number of pixels of the tile that are inside the picture.
     pub pixels: u32,
     /// Mean of the numbers of samples per pixel in A and in B.
@@ -143,7 +149,7 @@ impl Estimator {
             means[pixel] = [0, 1].map(|r| weighted(tile.pixel(r, pixel), &per_sum[r]));
         }
         let (mut halves, mut squares) = ([ByMeasure::default(); 2], ByMeasure::default());
-        let mut captures = [Captures::default(); 2];
+        let (mut captures, mut sliver) = ([Captures::default(); 2], 0.0);
         for [x, y] in pixels() {
             let [a, b] = means[y * TILE + x];
             let (error, contrast) =
@@ -151,11 +157,15 @@ impl Estimator {
             halves[(x + y) % 2].add(1.0, error);
             squares.add(1.0, error.zip(error, |e, _| e * e));
             if let Some((channel, values)) = self.bright_channel(a, b) {
-                let neighbours = neighbours([x, y], tile.extent).map(|pixel| {
+                let dark = neighbours([x, y], tile.extent).map(|pixel| {
                     let [a, b] = means[pixel];
                     a[channel].min(b[channel]) * self.exposure
                 });
-                captures[(x + y) % 2].record(values, contrast, neighbours);
+                captures[(x + y) % 2].record(values, contrast, dark);
+                if values[0] >= LEAST_LAMP {
+                    let beside = neighbours([x, y], tile.extent).map(|pixel| means[pixel]);
+                    sliver = self.sliver([a, b], channel, beside, [n, m]).max(sliver);
+                }
             }
         }
         let pixels = width * height;
@@ -169,6 +179,7 @@ impl Estimator {
             allocation: black,
             squares,
             captures,
+            sliver: sliver as f32,
             pixels: pixels as u32,
             samples: counts[0].midpoint(counts[1]),
         })
@@ -198,6 +209,29 @@ impl Estimator {
             contrast += to_dark * to_dark;
         }
         (ByMeasure { linear, levels }, contrast)
+    }
+
+    /// Returns [`TileNoise::sliver`] of the pixels `beside` a pixel that shows a lamp. The means in A
+    /// and B of that pixel are `lamp`, of `n` and `m` samples; its brightest channel is `channel`.
+    #[inline(never)]
+    fn sliver(
+        &self,
+        lamp: [[f64; 3]; 2],
+        channel: usize,
+        beside: impl Iterator<Item = [[f64; 3]; 2]>,
+        [n, m]: [f64; 2],
+    ) -> f64 {
+        let samples = n + m;
+        let lamp = [0, 1, 2].map(|c| lamp[0][c].min(lamp[1][c]));
+        let hit = 0.5 * lamp[channel] / n.max(m);
+        let is_missed = |[a, b]: &[[f64; 3]; 2]| a[channel].min(b[channel]) < hit;
+        let square = |[a, b]: [[f64; 3]; 2]| -> f64 {
+            let dark = [0, 1, 2].map(|c| a[c].min(b[c]));
+            let sliver = self.levels([0, 1, 2].map(|c| dark[c] + lamp[c] / samples));
+            let dark = self.levels(dark);
+            (0..3).map(|c| (sliver[c] - dark[c]).powi(2)).sum()
+        };
+        beside.filter(is_missed).map(square).fold(0.0, f64::max)
     }
 
     /// Returns the brightest channel of a pixel whose means in A and B are `a` and `b`, with its

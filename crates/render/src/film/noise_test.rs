@@ -263,6 +263,23 @@ fn replicate_with_fewer_samples_still_has_an_estimate() {
     assert!(ratios.iter().all(|r| (0.98..1.02).contains(r)), "{ratios:?}");
 }
 
+/// Checks the error of a pixel beside a lamp that no sample has hit, and of one that both replicates
+/// have hit.
+#[test]
+fn sliver_of_a_lamp_is_counted_until_it_is_hit() {
+    let mut film = film(16, 16, &[1.0]);
+    let estimator = Estimator::new(&film.header.scales, &white(1), &Display::default());
+    let mut sliver = |beside: f64| {
+        film.restart();
+        fill(&mut film, 8, |x, y, _| vec![if [x, y] == [3, 5] { 32.0 } else { 8.0 * beside }; 3]);
+        estimator.tile(film.tile(0).unwrap()).unwrap().sliver
+    };
+    // One of 16 samples.
+    let level = Display::default().levels([0.25; 3])[0];
+    assert!((f64::from(sliver(0.0)) / (3.0 * level * level) - 1.0).abs() < 1e-6);
+    assert_eq!(sliver(0.5), 0.0);
+}
+
 #[test]
 fn noise_combines_the_tiles() {
     let tile = |levels: f64, pixels| {
@@ -272,6 +289,7 @@ fn noise_combines_the_tiles() {
             allocation: mse,
             squares: ByMeasure::SPREAD,
             captures: Default::default(),
+            sliver: 0.0,
             pixels,
             samples: 4,
         })
@@ -292,6 +310,7 @@ fn noise_combines_the_tiles() {
                 allocation: mse(allocation),
                 squares: ByMeasure::SPREAD,
                 captures: Default::default(),
+                sliver: 0.0,
                 pixels: 256,
                 samples,
             })

@@ -1,8 +1,8 @@
 //! Render of the samples of one shard, in steps between which the film can be saved.
 
-use crate::film::file::{FilmFileHeader, FilmReader, tile_record};
+use crate::film::file::{FilmFileHeader, FilmReader, estimate_record, tile_record};
 use crate::film::{Header, TILE, TILE_PIXELS};
-use crate::plan::share_report::{CUTS_TAG, REPORT_TAG, encode_noise};
+use crate::plan::share_report::{CUTS_TAG, REPORT_TAG};
 use crate::plan::{Plan, PlannedTile, Share, ShareReport, TileReport};
 use crate::schedule::{Interval, SAMPLE_ALIGNMENT, Spp};
 use crate::session::{Report, State};
@@ -207,7 +207,7 @@ impl ShardRender {
             let error = held.filter(|_| complete && is_whole).and_then(|t| estimator.tile(t));
             out.extend(tile.rays.to_le_bytes());
             out.extend([u8::from(tile.glossy), u8::from(error.is_some())]);
-            error.iter().for_each(|error| encode_noise(error, &mut out));
+            error.iter().for_each(|error| estimate_record::encode(error, &mut out));
             if complete && !is_whole {
                 cuts.extend((number as u32).to_le_bytes());
                 tile_record::encode(held, &mut cuts);

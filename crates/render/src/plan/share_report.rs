@@ -1,8 +1,8 @@
 //! Report of a shard on its tiles, in the header of its part: what the next round is planned from.
 //! The planner therefore reads no films.
 
-use crate::film::file::{Fields, FilmFileHeader, tile_record};
-use crate::film::{ByMeasure, Captures, Estimator, Tile, TileNoise};
+use crate::film::file::{Fields, FilmFileHeader, estimate_record, tile_record};
+use crate::film::{Estimator, Tile, TileNoise};
 use std::collections::BTreeMap;
 
 /// Tag of the chunk with the report: the number of the first tile (u32), then a record of each tile:
@@ -40,7 +40,7 @@ impl ShareReport {
         while !fields.is_empty() {
             let rays = fields.u64()?;
             let [glossy, estimated] = [fields.u8()? == 1, fields.u8()? == 1];
-            let error = if estimated { Some(decode_noise(&mut fields)?) } else { None };
+            let error = if estimated { Some(estimate_record::decode(&mut fields)?) } else { None };
             tiles.push(TileReport { rays, glossy, error });
         }
         Some(Self { first, tiles })
@@ -91,28 +91,4 @@ impl RoundReport {
         }
         self.tiles
     }
-}
-
-pub(super) fn encode_noise(noise: &TileNoise, out: &mut Vec<u8>) {
-    for pair in [noise.reported, noise.allocation, noise.squares] {
-        [pair.linear, pair.levels].iter().for_each(|value| out.extend(value.to_le_bytes()));
-    }
-    for class in noise.captures.iter().flat_map(|captures| &captures.0) {
-        let values = [class.once, class.twice, class.excess, class.contrast];
-        values.iter().for_each(|value| out.extend(value.to_le_bytes()));
-    }
-    [noise.pixels, noise.samples].iter().for_each(|count| out.extend(count.to_le_bytes()));
-}
-
-fn decode_noise(fields: &mut Fields) -> Option<TileNoise> {
-    let mut pair = || Some(ByMeasure { linear: fields.f64()?, levels: fields.f64()? });
-    let [reported, allocation, squares] = [pair()?, pair()?, pair()?];
-    let mut captures = [Captures::default(); 2];
-    for class in captures.iter_mut().flat_map(|captures| &mut captures.0) {
-        let mut value = || fields.u32().map(f32::from_bits);
-        (class.once, class.twice) = (value()?, value()?);
-        (class.excess, class.contrast) = (value()?, value()?);
-    }
-    let (pixels, samples) = (fields.u32()?, fields.u32()?);
-    Some(TileNoise { reported, allocation, squares, captures, pixels, samples })
 }

@@ -185,6 +185,12 @@ impl Schedule {
         let mut allocation = Allocation::new(self, self.samples_to(spp));
         let budget = ROUND_SHARE * self.rays as f64;
         allocation.explore(EXPLORATION * budget);
+        for tile in self.tiles_with_slivers() {
+            let samples = allocation.next_block(tile);
+            if samples > 0 {
+                allocation.allocate(tile, samples);
+            }
+        }
 
         let over_picture = |rmse: f64| rmse * rmse * self.pixels() as f64;
         let noise = self.largest_recent_noise();

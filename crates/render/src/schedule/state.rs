@@ -13,8 +13,8 @@
 //! - an option of the same parts for the render whose round a stop criterion has cut off.
 
 use crate::error_probe::{PairedDifference, ProbeSums};
-use crate::film::file::Fields;
-use crate::film::{ByMeasure, Captures, Class, Noise, TileNoise};
+use crate::film::file::{Fields, estimate_record};
+use crate::film::{ByMeasure, Noise, TileNoise};
 use crate::schedule::tile::Tile;
 use crate::schedule::{Criterion, MAX_SAMPLES, Schedule};
 use crate::wave::Job;
@@ -50,9 +50,9 @@ impl Schedule {
             out.extend(tile.rays.to_le_bytes());
             out.push(u8::from(tile.glossy));
             out.push(u8::from(tile.error.is_some()));
-            tile.error.iter().for_each(|estimate| encode_estimate(estimate, &mut out));
+            tile.error.iter().for_each(|estimate| estimate_record::encode(estimate, &mut out));
             out.push(tile.history.len() as u8);
-            tile.history.iter().for_each(|estimate| encode_estimate(estimate, &mut out));
+            tile.history.iter().for_each(|estimate| estimate_record::encode(estimate, &mut out));
         }
         out.push(u8::from(self.interrupted.is_some()));
         self.interrupted.iter().for_each(|whole| out.extend(whole.encode()));
@@ -147,27 +147,8 @@ fn decode_tile(tile: &mut Tile, fields: &mut Fields) -> Option<()> {
     Some(())
 }
 
-fn encode_estimate(noise: &TileNoise, out: &mut Vec<u8>) {
-    out.extend(noise.samples.to_le_bytes());
-    [noise.reported, noise.allocation, noise.squares].into_iter().for_each(|m| by_measure(m, out));
-    for class in noise.captures.iter().flat_map(|captures| captures.0) {
-        let Class { once, twice, excess, contrast } = class;
-        [once, twice, excess, contrast].iter().for_each(|n| out.extend(n.to_le_bytes()));
-    }
-}
-
 fn decode_estimate(pixels: u32, fields: &mut Fields) -> Option<TileNoise> {
-    let samples = fields.u32().filter(|samples| *samples > 0)?;
-    let [reported, allocation, squares] =
-        [decode_by_measure(fields)?, decode_by_measure(fields)?, decode_by_measure(fields)?];
-    let mut captures = [Captures::default(); 2];
-    for class in captures.iter_mut().flat_map(|captures| &mut captures.0) {
-        let mut number =
-            || fields.u32().map(f32::from_bits).filter(|number| number.is_nan() || *number >= 0.0);
-        let [once, twice] = [number()?, number()?];
-        *class = Class { once, twice, excess: number()?, contrast: number()? };
-    }
-    Some(TileNoise { reported, allocation, squares, captures, pixels, samples })
+    estimate_record::decode(fields).filter(|estimate| estimate.pixels == pixels)
 }
 
 fn encode_probe(sums: &ProbeSums, out: &mut Vec<u8>) {

@@ -11,6 +11,9 @@ use crate::schedule::{Criterion, Interval, MAX_SAMPLES, Schedule, StoppedBy};
 /// 1.22 with 12. If the estimates before the latest three doublings must meet the target as well,
 /// the ratios are 1.56, 1.23 and 1.11.
 const FEW_PIXELS_TO_STOP: f64 = 64.0;
+/// Largest error of a picture, as a share of the target, that is due to one pixel at the edge of a
+/// lamp in which no sample has hit the lamp.
+const SLIVER_ERROR: f64 = 0.25;
 
 impl Schedule {
     /// Estimates the seconds left until the first stop criterion is reached, after `seconds` seconds
@@ -73,7 +76,7 @@ impl Schedule {
     /// Returns the criterion of error, cap or time that ends the render; `None` if it continues.
     pub(super) fn reason_to_stop(&self, seconds: f64) -> Option<StoppedBy> {
         let stop = &self.settings.stop;
-        if let Some(noise) = self.largest_recent_noise().filter(|_| self.min_samples_reached()) {
+        if let Some(noise) = self.largest_recent_noise().filter(|_| self.has_enough_samples()) {
             if stop.noise_levels.is_some_and(|t| noise.rmse.levels <= t) {
                 return Some(StoppedBy::Noise);
             }
@@ -130,8 +133,24 @@ impl Schedule {
     }
 
     /// Returns `true` if every tile has enough samples for the estimated error to end the render.
-    fn min_samples_reached(&self) -> bool {
+    fn has_enough_samples(&self) -> bool {
         let min_samples = self.min_samples();
-        self.tiles.iter().all(|t| t.done >= min_samples.min(self.cap(t)))
+        let has_enough = |tile: &Tile| tile.done >= min_samples.min(self.cap(tile));
+        self.tiles.iter().all(has_enough) && self.tiles_with_slivers().next().is_none()
+    }
+
+    /// Returns the numbers of the tiles below their cap whose
+    /// [`TileNoise::sliver`](crate::film::TileNoise::sliver) is above [`SLIVER_ERROR`]. There are none
+    /// in uniform pictures, and without an error target in levels.
+    pub(super) fn tiles_with_slivers(&self) -> impl Iterator<Item = usize> {
+        let is_counted = |criterion| self.settings.adaptive && criterion == Criterion::Levels;
+        let target = self.target().filter(|(criterion, _)| is_counted(*criterion));
+        let rmse = target.map_or(f64::INFINITY, |(_, target)| SLIVER_ERROR * target);
+        let largest = 3.0 * self.pixels() as f64 * rmse * rmse;
+        let has_sliver = move |tile: &Tile| {
+            tile.error.is_some_and(|error| f64::from(error.sliver) > largest)
+                && tile.done < self.cap(tile)
+        };
+        (0..self.tiles.len()).filter(move |tile| has_sliver(&self.tiles[*tile]))
     }
 }

@@ -78,7 +78,7 @@ impl<R: Read> FilmReader<R> {
         }
         let version = input.take(4, "its version")?;
         let version = u32::from_le_bytes([version[0], version[1], version[2], version[3]]);
-        if !(2..=VERSION).contains(&version) {
+        if version != VERSION {
             return Err(input.error(
                 format!("it has version {version} of the format, and this program reads {VERSION}"),
                 "use the program that wrote it, or render again",

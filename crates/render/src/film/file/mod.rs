@@ -30,6 +30,7 @@
 
 mod decode;
 mod encode;
+pub(crate) mod estimate_record;
 #[cfg(test)]
 mod tests;
 pub(crate) mod tile_record;
@@ -48,8 +49,8 @@ use zerkalo_scene::process_memory::missing_memory;
 
 /// First bytes of a film file.
 const MAGIC: [u8; 8] = *b"\x89ZKF\r\n\x1a\n";
-/// Version of the film file format that is written. Version 2, which is read, too, names all tiles.
-const VERSION: u32 = 3;
+/// Version of the film file format.
+const VERSION: u32 = 4;
 /// Number of tiles in a `TILE` chunk, fewer in the last one.
 const TILES_PER_CHUNK: usize = 64;
 /// Largest width and height, in pixels, of a film that is read from a file.

@@ -131,9 +131,9 @@ fn altered_bytes_are_refused() {
     let error = read(b"\x89PNG\r\n\x1a\n0000").unwrap_err().to_string();
     assert!(error.contains("it is not a film file") && error.contains("--checkpoint"), "{error}");
     let mut newer = bytes.clone();
-    newer[8] = 4;
+    newer[8] = 5;
     let error = read(&newer).unwrap_err().to_string();
-    assert!(error.contains("version 4 of the format, and this program reads 3"), "{error}");
+    assert!(error.contains("version 5 of the format, and this program reads 4"), "{error}");
     let error = read(&[&bytes[..], b"x"].concat()).unwrap_err().to_string();
     assert!(error.contains("1 bytes follow its end"), "{error}");
 }

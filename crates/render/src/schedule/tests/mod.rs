@@ -104,6 +104,7 @@ impl Model {
             allocation,
             squares: SPREAD_OUT,
             captures: Default::default(),
+            sliver: 0.0,
             pixels: PIXELS,
             samples,
         }
