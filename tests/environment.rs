@@ -253,7 +253,7 @@ fn panorama_of_an_environment_is_its_image() {
     }
 }
 
-/// Checks that a small ball is lit by its surroundings as by their panorama.
+/// Checks that a small ball is lit by surroundings that only emit light as by their panorama.
 #[test]
 fn panorama_lights_as_the_scene_does() {
     let folder = tempfile::tempdir().unwrap();
@@ -267,8 +267,9 @@ fn panorama_lights_as_the_scene_does() {
         color = [1.0, 0.8, 0.5]
         intensity = 2.0
         [materials.wall]
-        color = [0.1, 0.3, 0.2]
+        color = [0.0, 0.0, 0.0]
         emission = 1.0
+        emission_color = [0.4, 1.0, 0.7]
         [[object]]
         material = \"wall\"
         shape.rectangle = { center = [0.0, -3.0, 3.0], size = [5.0, 3.0], normal = [0.0, 0.7, -0.7] }\n";
