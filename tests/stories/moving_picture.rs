@@ -137,8 +137,8 @@ fn draw(font: &FontVec, desk: &Desk, view: &mut DashboardView, caption: &str) ->
 struct Recording {
     desk: Desk,
     session: Session,
-    /// View and scene that the session has.
-    given: (View, Arc<Scene>),
+    /// Scene that the session has.
+    scene: Arc<Scene>,
     generation: u64,
     /// Frames since the picture was begun.
     age: u32,
@@ -153,7 +153,7 @@ impl Recording {
         let mut session = new_session(2, 1, spp_stop(SAMPLES_PER_FRAME), false);
         let scene = Arc::clone(desk.model.seen());
         let generation = session.set_scene(Arc::clone(&scene));
-        Self { desk, session, given: (View::default(), scene), generation, age: 0 }
+        Self { desk, session, scene, generation, age: 0 }
     }
 
     /// Presses the key, and shows the picture with the samples of one more frame.
@@ -165,15 +165,16 @@ impl Recording {
         self.desk.send(Message::Tick);
         self.age += 1;
         let scene = Arc::clone(self.desk.model.seen());
-        if !Arc::ptr_eq(&scene, &self.given.1) {
-            let snapshot = self.desk.model.snapshot.as_ref().unwrap();
-            if snapshot.weights_for(&scene).is_none() {
-                self.age = 1;
-            }
-            self.generation = self.session.set_scene(Arc::clone(&scene));
-            self.given.1 = scene;
+        let snapshot = self.desk.model.snapshot.as_ref();
+        if snapshot.is_some_and(|snapshot| snapshot.weights_for(&scene).is_none()) {
+            self.age = 1;
         }
+        // Before the scene, whose render would otherwise have the old stop.
         self.session.set_stop(spp_stop(self.age * SAMPLES_PER_FRAME));
+        if !Arc::ptr_eq(&scene, &self.scene) {
+            self.generation = self.session.set_scene(Arc::clone(&scene));
+            self.scene = scene;
+        }
         loop {
             let wanted = self.desk.model.requested;
             self.session.set_view(wanted);
@@ -185,7 +186,8 @@ impl Recording {
         }
     }
 
-    /// Waits for the picture with all samples that are due; the times in its report are simulated.
+    /// Waits for the picture with all samples that are due. The times in its report are simulated; the
+    /// noise is that of the film, as the session's estimate may come later.
     fn snapshot(&self, view: View) -> Snapshot {
         loop {
             let mut snapshot =
@@ -199,10 +201,14 @@ impl Recording {
                 && matches!(report.state, State::Finished(_))
                 && report.spp.min == spp;
             if is_done && is_shown {
+                let noise = self
+                    .session
+                    .with(|state, _| state.film.noise(&state.weights, &state.display()));
                 let seconds = f64::from(self.age) / f64::from(FRAMES_PER_SECOND);
                 snapshot.report = Report {
                     state: State::Tracing,
                     seconds,
+                    noise: noise.flatten(),
                     recent_samples_per_second: report.samples as f64 / seconds,
                     eta_seconds: None,
                     error: None,
