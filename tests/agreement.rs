@@ -43,7 +43,7 @@ fn samples_of(name: &str) -> u32 {
 }
 
 /// Files of scenes that the reference tracer must support, so that they are compared.
-const GALLERY: &str = "mirror-room.toml triptych.toml gallery-metals.toml glass-solids.toml \
+const GALLERY: &str = "mirror-room.toml triptych.toml goblet.toml glass-solids.toml \
      rough-glass.toml absorbing-glass.toml texture-checker.toml texture-image.toml \
      texture-mapping.toml texture-uv.toml bump.toml depth-of-field.toml sphere-light.toml \
      rectangle-light.toml disk-light.toml sun.toml environment.toml emissive-objects.toml \

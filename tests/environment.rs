@@ -1,6 +1,10 @@
 //! Environment lights: white furnaces, very bright pixels, scaled and rotated images, hostile files.
 
 use crate::harness::*;
+use zerkalo_render::film::file::FilmFileHeader;
+use zerkalo_render::film::testing::header;
+use zerkalo_render::image_file::{Depth, ImageOutput};
+use zerkalo_scene::asset::RadianceMap;
 
 /// Returns the mean of each channel over the picture, and the standard error of the mean. The error
 /// comes from the difference of the two replicates; pixels are independent.
@@ -213,5 +217,84 @@ fn hostile_environment_images_are_located_errors() {
         let error = error();
         assert!(error.contains(words), "{words}: {error}");
         assert!(error.contains("scene.toml:3:") && error.contains("\"sky\""), "{error}");
+    }
+}
+
+/// Returns the panorama from the origin towards -z of the scene in `text`, rendered in double precision and written
+/// to `folder` as `sky.hdr`, an image of `size` pixels.
+fn panorama(folder: &Path, text: &str, size: [u32; 2], samples: u32) -> RadianceMap {
+    let path = folder.join("around.toml");
+    let camera = "eye = [0, 0, 0], direction = [0, 0, -1], projection = \"equirectangular\"";
+    fs::write(&path, format!("camera = {{ {camera} }}\n{text}")).unwrap();
+    let rendering =
+        rendered(&sized(Scene::read(&path).unwrap(), size), 1, Precision::Double, samples);
+    let header = FilmFileHeader { weights: rendering.weights.clone(), ..header(&rendering.film) };
+    let output = ImageOutput::from_path(folder.join("sky.hdr")).unwrap();
+    output.write(&header, Depth::Eight, &mut &rendering.film).unwrap();
+    RadianceMap::clone(floor(folder, "").lights[0].environment().unwrap().map().unwrap())
+}
+
+/// Checks that the panorama of an environment alone has the pixels of its image, in a file of the same values.
+#[test]
+fn panorama_of_an_environment_is_its_image() {
+    let folder = tempfile::tempdir().unwrap();
+    // Rows with runs, and a width below the smallest of rows with runs.
+    for size in [[40, 20], [6, 3]] {
+        let texel = |x: usize, y: usize| match y % 3 {
+            0 => [200, 128 + (7 * x % 90) as u8, (x / 9) as u8, 129],
+            _ => [140 + (x / 11) as u8, 3, 90 + (y % 7) as u8, 126 + (x % 5) as u8],
+        };
+        write_hdr(&folder.path().join("image.hdr"), size, texel);
+        let text = "film.filter = \"point\"\n[[light]]\nenvironment.file = \"image.hdr\"";
+        let shown = panorama(folder.path(), text, size.map(|n| n as u32), 2);
+        write_hdr(&folder.path().join("sky.hdr"), size, texel);
+        let original = floor(folder.path(), "");
+        assert!(shown == **original.lights[0].environment().unwrap().map().unwrap());
+    }
+}
+
+/// Checks that a small ball is lit by surroundings that only emit light as by their panorama.
+#[test]
+fn panorama_lights_as_the_scene_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let around = "[[light]]
+        environment = { zenith = [0.2, 0.3, 0.5], horizon = [0.3, 0.2, 0.1], nadir = [0.1, 0.1, 0.1] }
+        [[light]]
+        sphere = { center = [3.0, 2.5, 1.0], radius = 0.9 }
+        intensity = 4.0
+        [[light]]
+        rectangle = { center = [-2.0, 3.0, -3.0], size = [2.0, 3.0], normal = [0.4, -0.6, 0.7] }
+        color = [1.0, 0.8, 0.5]
+        intensity = 2.0
+        [materials.wall]
+        color = [0.0, 0.0, 0.0]
+        emission = 1.0
+        emission_color = [0.4, 1.0, 0.7]
+        [[object]]
+        material = \"wall\"
+        shape.rectangle = { center = [0.0, -3.0, 3.0], size = [5.0, 3.0], normal = [0.0, 0.7, -0.7] }\n";
+    let ball = "[[object]]
+        material = \"ball\"
+        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1e-3 }
+        [materials.ball]
+        color = [1.0, 1.0, 1.0]
+        ambient = 0.0
+        diffuse = 0.6
+        reflection = 0.4
+        lobe = \"ggx\"
+        alpha = 0.4\n";
+    let look = "film.size = [32, 32]
+        camera = { eye = [0.0, 0.002, 0.004], target = [0.0, 0.0, 0.0], view_angle.vertical = 24 }\n";
+    panorama(folder.path(), around, [256, 128], 32);
+    let by_image = folder.path().join("by-image.toml");
+    fs::write(&by_image, format!("{look}{ball}[[light]]\nenvironment.file = \"sky.hdr\"")).unwrap();
+    let by_image = Scene::read(&by_image).unwrap();
+    let [direct, by_image] = [parsed(&format!("{look}{around}{ball}")), by_image]
+        .map(|scene| mean(&scene, 3, Precision::Double, 256));
+    for ((direct, e), (image, f)) in direct.into_iter().zip(by_image) {
+        let z = (direct - image) / e.hypot(f);
+        println!("{direct:.5} +- {e:.5} {image:.5} +- {f:.5}, z {z:.2}");
+        // The pixels are up to 0.025 radians wide, so that edges of lights blur: two parts in a thousand.
+        assert!((direct - image).abs() <= two_sided_z(1e-4 / 3.0) * e.hypot(f) + 2e-3 * direct);
     }
 }

@@ -183,11 +183,11 @@ pub struct RenderArgs {
     /// the scene, from 1, and %04d has leading zeros
     #[arg(value_name = "SCENE", conflicts_with = "plan")]
     pub more: Vec<PathBuf>,
-    /// The picture file; its extension chooses the format: .png or .exr; - for stdout
+    /// The picture file; its extension chooses the format: .png, .exr or .hdr; - for stdout
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Format of the picture, instead of that of the extension [default for stdout: png]
-    #[arg(long, value_parser = ["png", "exr"], conflicts_with = "plan")]
+    #[arg(long, value_parser = ["png", "exr", "hdr"], conflicts_with = "plan")]
     pub format: Option<String>,
     #[command(flatten)]
     pub clobber: ClobberArgs,

@@ -2,7 +2,7 @@
 
 use crate::dashboard::{DisplayChannel, Layout, Mode, Model, Overlay};
 use glam::DVec3;
-use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::camera::CompiledCamera;
 use zerkalo_scene::edit::{Target, bounds};
 use zerkalo_scene::light::Light;
 
@@ -50,10 +50,10 @@ impl Model {
     /// hidden.
     pub fn light_marks(&self, layout: &Layout) -> Vec<LightMark> {
         let scene = self.seen();
-        let camera = PerspectiveCamera::new(&scene.camera, scene.film.size, DVec3::ZERO);
+        let camera = CompiledCamera::new(&scene.camera, scene.film.size, DVec3::ZERO);
         let cell = |point: DVec3| {
-            let is_ahead = (point - camera.eye).dot(camera.frame[2]) > 0.0;
-            is_ahead.then(|| camera.project(point))
+            let is_seen = camera.is_panorama() || (point - camera.eye).dot(camera.frame[2]) > 0.0;
+            is_seen.then(|| camera.project(point))
         };
         let mark = |(light, desc): (usize, &Light)| {
             let direction = desc.direction().and_then(|d| DVec3::from(d).try_normalize());

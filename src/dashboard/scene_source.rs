@@ -13,7 +13,7 @@ pub const NEW: &str = include_str!("new_scene.toml");
 pub const BUILT_IN: [(&str, &str); 6] = [
     ("lamp-and-mirror", include_str!("../../scenes/lamp-and-mirror.toml")),
     ("mirror-room", include_str!("../../scenes/mirror-room.toml")),
-    ("gallery-metals", include_str!("../../scenes/gallery-metals.toml")),
+    ("goblet", include_str!("../../scenes/features/goblet.toml")),
     ("gallery-glass", include_str!("../../scenes/gallery-glass.toml")),
     ("gallery-dusk", include_str!("../../scenes/gallery-dusk.toml")),
     ("gallery-water", include_str!("../../scenes/gallery-water.toml")),

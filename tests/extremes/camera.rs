@@ -1,10 +1,10 @@
 //! Extremes of cameras and of orthonormal frames.
 
 use crate::harness::*;
-use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::camera::CompiledCamera;
 
 fn check_finite<L: SimdFloat>(camera: &Camera, size: [u32; 2], name: &str) {
-    let view = PerspectiveCamera::new(camera, size, DVec3::ZERO);
+    let view = CompiledCamera::new(camera, size, DVec3::ZERO);
     let [u, v, w] = view.frame;
     for (a, b, expected) in
         [(u, u, 1.0), (v, v, 1.0), (w, w, 1.0), (u, v, 0.0), (v, w, 0.0), (w, u, 0.0)]
@@ -58,7 +58,7 @@ fn extreme_17_narrow_and_wide_angles_are_right() {
     let mut worst = 0f64;
     for degrees in [1e-3f64, 1.0, 90.0, 179.9] {
         let camera = Camera { view_angle: ViewAngle::Horizontal(degrees), ..Camera::at_origin() };
-        let view = PerspectiveCamera::new(&camera, [1000, 1], DVec3::ZERO);
+        let view = CompiledCamera::new(&camera, [1000, 1], DVec3::ZERO);
         let angle = |y: f64| {
             let Ray { direction: left, .. } =
                 view.rays(Vec3::<f64>::splat(view.pixel_corner_direction((0, 0))), (0.0, y));

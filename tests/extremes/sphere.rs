@@ -1,7 +1,7 @@
 //! Spheres seen from afar, from inside, as ground, and at the limb.
 
 use crate::harness::*;
-use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::camera::CompiledCamera;
 
 /// Unevaluated sum of two doubles, with about 106 bits (Dekker 1971, Knuth).
 #[derive(Clone, Copy)]
@@ -164,7 +164,7 @@ fn extreme_02_sphere_as_ground() {
         let auto = AnyWorld::compile(&scene, &Options::default());
         assert!(matches!(auto, AnyWorld::Double(_)));
         let traced = Traced::new(&scene, Precision::Double);
-        let view = PerspectiveCamera::new(&scene.camera, scene.film.size, DVec3::ZERO);
+        let view = CompiledCamera::new(&scene.camera, scene.film.size, DVec3::ZERO);
         let pixels: Vec<(u32, u32)> =
             (242..480).flat_map(|y| (0..64).map(move |x| (x, y))).collect();
         let lines: Vec<Line> = pixels

@@ -150,3 +150,19 @@ fn d1_thin_lens() {
     reworded.camera.focus = Some(Focus::Distance(zoomed.camera.focus_depth()));
     agrees(&zoomed, &reworded, 1536).unwrap();
 }
+
+#[test]
+fn d13_panorama() {
+    let original = shipped("panorama.toml");
+    row(
+        "panorama.toml",
+        |tested| hits_agree(&original, tested),
+        &[
+            ("a perspective", &|s| s.camera.projection = Projection::Perspective),
+            ("looking elsewhere", &|s| s.camera.direction = Some([0.33, 0.1, -1.0])),
+            ("looking level", &|s| s.camera.direction = Some([0.3, 0.0, -1.0])),
+            ("upside down", &|s| s.camera.up = [0.0, -1.0, 0.0]),
+            ("another eye", &|s| s.camera.eye[0] += 0.02),
+        ],
+    );
+}

@@ -48,7 +48,7 @@ pub use zerkalo_render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
 pub use zerkalo_render::session::{Session, State};
 pub use zerkalo_render::{Checkpoint, RenderState};
 pub use zerkalo_scene::asset::Assets;
-pub use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
+pub use zerkalo_scene::camera::{Aperture, Camera, Focus, Projection, ViewAngle};
 pub use zerkalo_scene::disk::Existing;
 pub use zerkalo_scene::edit::{SceneSettings, Target};
 pub use zerkalo_scene::light::{

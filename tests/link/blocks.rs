@@ -56,7 +56,7 @@ fn errors(film: &Raster, cells: &Buffer, blocks: Blocks) -> [f64; 2] {
 #[test]
 #[ignore = "a measurement"]
 fn errors_and_bytes_of_block_characters() {
-    for name in ["gallery-metals", "glass-solids", "triptych", "mirror-room", "lamp-and-mirror"] {
+    for name in ["goblet", "glass-solids", "triptych", "mirror-room", "lamp-and-mirror"] {
         let scene = sized(shipped(&format!("{name}.toml")), FILM.map(|n| n as u32));
         let mut rendering = begin(&scene, 0, Precision::Auto);
         let mut schedule = rendering.schedule(settings(false, 0, spp_stop(64)));

@@ -189,12 +189,13 @@ fn camera(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Camera {
     let first = numbers.below(ups.len());
     let up = ups[first..].iter().chain(&ups).find(aims).copied().unwrap_or(DVec3::X);
     let near = if chance(numbers, 1, 8) { spots.radius * log(numbers, 1e-3, 2.0) } else { 0.0 };
-    let (aperture, focus) = lens(eye, spots);
+    let (projection, aperture, focus) = lens(eye, near, spots);
     Camera {
         eye: eye.to_array(),
         target: None,
         direction: Some(look.to_array()),
         up: up.to_array(),
+        projection,
         view_angle: match numbers.below(3) {
             0 => ViewAngle::Horizontal(angle),
             _ => ViewAngle::Vertical(angle),
@@ -205,14 +206,17 @@ fn camera(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Camera {
     }
 }
 
-/// Returns aperture and focus of the camera. One camera in three has a lens. The random numbers
-/// depend on the eye alone, so that all other parts of the scene are the same with and without a
-/// lens.
-fn lens(eye: DVec3, spots: &Spots) -> (Option<Aperture>, Option<Focus>) {
+/// Returns projection, aperture and focus of the camera. One camera in three has a lens; of the others
+/// without a near plane, one in eight is a panorama. The random numbers depend on the eye alone, so that
+/// all other parts of the scene are the same with and without a lens.
+fn lens(eye: DVec3, near: f64, spots: &Spots) -> (Projection, Option<Aperture>, Option<Focus>) {
     let mut numbers =
         Numbers::new(eye.to_array().map(f64::to_bits).into_iter().fold(0, u64::wrapping_add));
     if !chance(&mut numbers, 1, 3) {
-        return (None, None);
+        let is_panorama = near == 0.0 && chance(&mut numbers, 1, 8);
+        let projection =
+            if is_panorama { Projection::Equirectangular } else { Projection::Perspective };
+        return (projection, None, None);
     }
     let aperture = match numbers.below(4) {
         0 => Aperture::FNumber(log(&mut numbers, 0.1, 10.0)),
@@ -225,7 +229,7 @@ fn lens(eye: DVec3, spots: &Spots) -> (Option<Aperture>, Option<Focus>) {
         _ => Focus::Distance(spots.radius * log(&mut numbers, 1e-2, 1e2)),
     };
     let aims = focus != Focus::Point(eye.to_array());
-    (aims.then_some(aperture), aims.then_some(focus))
+    (Projection::Perspective, aims.then_some(aperture), aims.then_some(focus))
 }
 
 fn lights(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Vec<Light> {

@@ -291,6 +291,11 @@ impl<'a> Tracer<'a> {
         let right = forward.cross(DVec3::from(camera.up)).normalize();
         let up = right.cross(forward);
         let [width, height] = self.scene.film.size.map(f64::from);
+        if camera.projection == Projection::Equirectangular {
+            let (azimuth, polar) = (TAU * (x / width - 0.5), PI * y / height);
+            let level = right * azimuth.sin() + forward * azimuth.cos();
+            return (eye, level * polar.sin() + up * polar.cos());
+        }
         let pixel = match camera.view_angle {
             ViewAngle::Vertical(degrees) => 2.0 * (0.5 * degrees).to_radians().tan() / height,
             ViewAngle::Horizontal(degrees) => 2.0 * (0.5 * degrees).to_radians().tan() / width,

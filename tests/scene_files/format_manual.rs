@@ -120,6 +120,9 @@ and every key with a default may be left out. Unknown keys are errors.
   is +x. Values of Radiance and OpenEXR files are radiances; values of PNG and JPEG files are sRGB levels. Negative
   values and NaN are replaced by 0, infinite ones by the largest finite value of the image, at least 65504; a note
   counts NaN and infinite pixels. An image has at most 33554432 pixels.
+- A camera with `projection = \"equirectangular\"` makes such an image of its surroundings: `zerkalo render room.toml -o
+  room.hdr`, with `direction = [0.0, 0.0, -1.0]` and a film twice as wide as high, lights another scene as the room does
+  at the place of the camera. `aperture`, `focus` and `near` cannot be given with it.
 - A Radiance image may have any of the eight orders of pixels; `EXPOSURE` and `COLORCORR` are divided out. Of an
   OpenEXR file, the first layer with the channels R, G and B is shown, otherwise Y as grey; their names may have a
   prefix if it is the only one with such channels in the layer. Primaries other than those of sRGB are converted.

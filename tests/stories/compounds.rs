@@ -190,7 +190,7 @@ fn second_click_selects_the_part() {
     let layout = desk.model.layout().unwrap();
     let at = |point: [f64; 3]| {
         let scene = desk.scene();
-        let camera = zerkalo_scene::camera::PerspectiveCamera::new(
+        let camera = zerkalo_scene::camera::CompiledCamera::new(
             &scene.camera,
             scene.film.size,
             glam::DVec3::ZERO,
@@ -214,7 +214,7 @@ fn second_click_selects_the_part() {
 
 #[test]
 fn goblet_story_takes_at_most_45_keys() {
-    let text = include_str!("../../scenes/gallery-metals.toml");
+    let text = include_str!("../../scenes/features/goblet.toml");
     let mut desk = Desk::new(text);
     let objects = desk.scene().objects.len();
     let keys =

@@ -7,6 +7,7 @@ mod compounds;
 mod editing;
 mod files;
 mod mouse;
+mod moving_picture;
 mod random;
 mod recovery;
 mod roughness;

@@ -24,7 +24,7 @@ use zerkalo_kernel::lanes::{Float, SimdFloat};
 use zerkalo_kernel::primitive::{
     AccelerationStructure, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
 };
-use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::camera::CompiledCamera;
 use zerkalo_scene::light::{CompiledLight, DeltaLight, EmissiveSurface};
 use zerkalo_scene::material::{Bsdf, Material};
 use zerkalo_scene::{Acceleration, BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
@@ -266,7 +266,7 @@ impl<S: Float> CompiledLights<S> {
         geometry: &RecenteredGeometry,
         materials: &CompiledMaterials<S>,
         primitives: &[PrimitiveId],
-        camera: &PerspectiveCamera,
+        camera: &CompiledCamera,
         groups: &LightGroups,
     ) -> (Self, Vec<f64>) {
         let materials_of = |object: usize| materials.of_parts(object);
@@ -358,7 +358,7 @@ fn culling<L: SimdFloat>(
     scene: &Scene,
     recentered: &RecenteredGeometry,
     geometry: &Aggregate<L>,
-    camera: &PerspectiveCamera,
+    camera: &CompiledCamera,
     lights: LightBounds,
     outside_only: &[bool],
 ) -> Culling<L::Scalar> {
@@ -381,6 +381,8 @@ fn culling<L: SimdFloat>(
                 let bounds = geometry.in_bvh().into_iter().map(project);
                 let size = scene.film.size.map(|n| n as usize);
                 CullingMode::ScreenGrid(ScreenGrid::new(size, bounds))
+            } else if camera.is_panorama() {
+                CullingMode::Off
             } else {
                 CullingMode::Frusta(culler)
             }
@@ -427,7 +429,7 @@ fn aggregate<L: SimdFloat>(scene: &Scene, forms: &[Form]) -> Aggregate<L> {
 }
 
 /// Returns a sphere around the eye that contains the lens and every start point on the near plane.
-fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> BoundingSphere {
+fn start_region(scene: &Scene, camera: &CompiledCamera) -> BoundingSphere {
     let size = scene.film.size.map(|n| n as usize);
     let corner_distances = camera.corners([0, 0], size).map(DVec3::length);
     let farthest_corner = corner_distances.into_iter().fold(0.0, f64::max);
@@ -453,7 +455,7 @@ impl<L: SimdFloat> World<L> {
         merge_lights: bool,
     ) -> Self {
         let default_material = Material::default();
-        let camera = PerspectiveCamera::new(&scene.camera, scene.film.size, recentered.origin);
+        let camera = CompiledCamera::new(&scene.camera, scene.film.size, recentered.origin);
         let materials = CompiledMaterials::new(scene, &default_material);
         let moved = materials.move_emissive_sheets(recentered, camera.eye);
         let recentered = moved.as_ref().unwrap_or(recentered);
@@ -469,7 +471,7 @@ impl<L: SimdFloat> World<L> {
     fn from_parts(
         scene: &Scene,
         recentered: &RecenteredGeometry,
-        camera: PerspectiveCamera,
+        camera: CompiledCamera,
         materials: CompiledMaterials<L::Scalar>,
         groups: LightGroups,
     ) -> Self {

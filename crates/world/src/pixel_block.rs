@@ -5,7 +5,7 @@
 use std::ops::Range;
 use zerkalo_kernel::lanes::{Float, SimdFloat, SimdU32, Vec3};
 use zerkalo_kernel::sampling::Sampler;
-use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::camera::CompiledCamera;
 
 /// Largest number of pixels in a block that is traced together; a multiple of every packet width.
 pub const MAX_BLOCK_PIXELS: usize = 256;
@@ -24,7 +24,7 @@ pub(super) struct PixelBlock<S> {
 impl<S: Float> PixelBlock<S> {
     /// Creates a block of at most [`MAX_BLOCK_PIXELS`] `pixels`, pairs of column and row.
     pub fn new<L: SimdFloat<Scalar = S>>(
-        camera: &PerspectiveCamera,
+        camera: &CompiledCamera,
         sampler: &Sampler<L>,
         replicate: usize,
         mut pixels: impl Iterator<Item = (u32, u32)>,

@@ -12,7 +12,7 @@ use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::primitive::Aggregate;
 use zerkalo_kernel::sampling::CameraDimensions;
 use zerkalo_scene::IntegratorSettings;
-use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::camera::CompiledCamera;
 use zerkalo_scene::light::{DeltaLight, EnvironmentLight};
 use zerkalo_scene::material::Bsdf;
 
@@ -97,7 +97,7 @@ pub struct World<L: SimdFloat> {
     /// `true` if sampled reflections below the horizon are mirrored, `false` if they are absorbed.
     pub(super) fold: bool,
     /// Camera, in coordinates relative to the scene's centre.
-    pub camera: PerspectiveCamera,
+    pub camera: CompiledCamera,
     pub(super) culling: Culling<L::Scalar>,
     /// Properties that do not depend on the SIMD type.
     pub info: WorldInfo,

@@ -6,7 +6,7 @@ use crate::dashboard::update::{Coalesce, Direction};
 use glam::DVec3;
 use std::sync::Arc;
 use zerkalo_kernel::primitive::HalfSpace;
-use zerkalo_scene::camera::Camera;
+use zerkalo_scene::camera::{Camera, Projection};
 use zerkalo_scene::edit::{Edit, Target, bounds, pivot_distance, scene_bounds, step_length};
 use zerkalo_scene::{Object, Scene};
 
@@ -78,6 +78,9 @@ impl UpdateContext<'_> {
 
     /// Widens the view by `steps` steps of about 5 %; negative steps narrow it.
     pub(super) fn view_angle(&mut self, steps: i32) {
+        if self.seen().camera.projection == Projection::Equirectangular {
+            return self.say("a panorama has no view angle");
+        }
         self.move_view(|camera, _| camera.zoom(ZOOM.powi(-steps)));
         let angle = self.seen().camera.view_angle;
         self.say(format!("{} view angle {}°", angle.key(), angle.degrees()));
@@ -152,7 +155,10 @@ impl UpdateContext<'_> {
     /// Returns half the width of the view at distance 1 in front of the eye.
     pub(super) fn half_width(&self) -> f64 {
         let scene = self.seen();
-        scene.camera.half_size(scene.film.size.map(f64::from))[0]
+        match scene.camera.projection {
+            Projection::Perspective => scene.camera.half_size(scene.film.size.map(f64::from))[0],
+            Projection::Equirectangular => std::f64::consts::PI,
+        }
     }
 
     /// Returns the change by a drag of one half cell. `across` is the change by a drag across the

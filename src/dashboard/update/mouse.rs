@@ -351,11 +351,8 @@ pub(super) struct ObjectHit {
 pub(super) fn first_hit(scene: &Scene, [x, y]: [usize; 2]) -> Option<ObjectHit> {
     let camera = &scene.camera;
     let [width, height] = scene.film.size.map(f64::from);
-    let half = camera.half_size([width, height]);
-    let [right, up, forward] = camera.frame();
-    let across = |pixel: usize, size: f64| (2.0 * (pixel as f64 + 0.5) / size) - 1.0;
-    let direction =
-        forward + right * (half[0] * across(x, width)) - up * (half[1] * across(y, height));
+    let at = [(x as f64 + 0.5) / width, (y as f64 + 0.5) / height];
+    let direction = camera.direction_at(at, [width, height]);
     let origin = DVec3::from_array(camera.eye) + direction * camera.near;
     let objects = scene.objects.iter().enumerate();
     let hits = objects.filter_map(|(i, object)| Some((i, object.form().cast(origin, direction)?)));

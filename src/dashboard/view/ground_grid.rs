@@ -12,14 +12,12 @@ const LINE: [u8; 3] = [72, 78, 92];
 /// the arrow keys; lines end where they would be closer than two pixels.
 pub fn raster(scene: &Scene, [width, height]: [usize; 2]) -> Raster {
     let camera = &scene.camera;
-    let (eye, [right, up, forward]) = (DVec3::from_array(camera.eye), camera.frame());
-    let [half_width, half_height] = camera.half_size(scene.film.size.map(f64::from));
+    let (eye, size) = (DVec3::from_array(camera.eye), scene.film.size.map(f64::from));
     let square = 10.0 * step_length(scene);
     // Position on the ground in squares.
     let ground = |x: usize, y: usize| {
-        let across = |at: usize, of: usize| (2 * at + 1) as f64 / of as f64 - 1.0;
-        let [x, y] = [across(x, width) * half_width, -across(y, height) * half_height];
-        let direction = forward + right * x + up * y;
+        let at = [(x as f64 + 0.5) / width as f64, (y as f64 + 0.5) / height as f64];
+        let direction = camera.direction_at(at, size);
         let t = -eye.y / direction.y;
         (t > 0.0 && t.is_finite()).then(|| [0, 2].map(|axis| (eye + direction * t)[axis] / square))
     };

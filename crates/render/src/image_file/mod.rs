@@ -1,9 +1,10 @@
-//! Image files: PNG and OpenEXR files of rendered pictures and their metadata, written row by row
+//! Image files: PNG, OpenEXR and Radiance HDR files of rendered pictures and their metadata, written row by row
 //! and read back.
 
 mod exr_header;
 mod exr_reader;
 mod exr_writer;
+mod hdr_writer;
 mod metadata;
 mod output;
 mod png_reader;

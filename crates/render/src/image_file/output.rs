@@ -2,7 +2,7 @@
 
 use crate::film::Film;
 use crate::film::file::FilmFileHeader;
-use crate::image_file::{exr_writer, png_writer};
+use crate::image_file::{exr_writer, hdr_writer, png_writer};
 use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::PathBuf;
@@ -44,9 +44,10 @@ struct Format {
 }
 
 /// Formats that an extension chooses.
-static FORMATS: [Format; 2] = [
+static FORMATS: [Format; 3] = [
     Format { extension: "png", encode: png_writer::encode },
     Format { extension: "exr", encode: exr_writer::encode },
+    Format { extension: "hdr", encode: hdr_writer::encode },
 ];
 /// Format that only [`ImageOutput::without_layers`] chooses.
 static EXR_WITHOUT_LAYERS: Format =
@@ -87,12 +88,12 @@ impl ImageOutput {
 
     /// Returns `true` if the format stores linear radiance.
     pub fn is_linear(&self) -> bool {
-        self.format.extension == "exr"
+        self.format.extension != "png"
     }
 
     /// Leaves out all channels of an EXR file except those of the picture.
     pub fn without_layers(mut self) -> Self {
-        if self.is_linear() {
+        if self.format.extension == "exr" {
             self.format = &EXR_WITHOUT_LAYERS;
         }
         self

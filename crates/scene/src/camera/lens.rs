@@ -41,10 +41,10 @@ const HALF_FILM_HEIGHT: f64 = 0.012;
 const HALF_FILM_WIDTH: f64 = 0.018;
 
 impl Camera {
-    /// Returns this camera with the near plane, the aperture and the focus of `other`.
+    /// Returns this camera with the projection, the near plane, the aperture and the focus of `other`.
     pub fn with_lens_of(&self, other: &Self) -> Self {
-        let Self { near, aperture, focus, .. } = *other;
-        Self { near, aperture, focus, ..self.clone() }
+        let Self { projection, near, aperture, focus, .. } = *other;
+        Self { projection, near, aperture, focus, ..self.clone() }
     }
 
     /// Returns the radius of the lens in scene units, 0 to 1e9; 0 is a pinhole. A lens of the focal

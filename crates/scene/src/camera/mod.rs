@@ -2,20 +2,22 @@
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
+mod compiled;
 mod lens;
 mod navigate;
-mod perspective;
 
+pub use compiled::{CompiledCamera, ThinLens};
 pub use lens::{Aperture, Focus};
-pub use perspective::{PerspectiveCamera, ThinLens};
 
 use crate::TomlText;
-use crate::value::{Description, Field, KeyNode, ValidationError, description, one_of, unit};
+use crate::value::{
+    Description, Field, KeyNode, ValidationError, choices, description, one_of, unit,
+};
 use glam::DVec3;
 use toml::Value;
 
 description! {
-    /// Perspective camera: a pinhole, or a thin lens with a plane in focus.
+    /// Camera: a pinhole, a thin lens with a plane in focus, or a panorama.
     pub struct Camera {
         /// Position of the camera.
         eye: [f64; 3] = [0.0, 1.0, 5.0], in COORDINATE "scene units";
@@ -25,7 +27,10 @@ description! {
         direction: Option<[f64; 3]>, or "`target` is needed", as Direction;
         /// Up direction of the picture; not parallel to the view direction.
         up: [f64; 3] = [0.0, 1.0, 0.0], as Direction;
-        /// Opening angle of the camera, across the height or across the width of the picture.
+        /// Map from directions to the picture.
+        projection: Projection = "perspective";
+        /// Opening angle of the camera, across the height or across the width of the picture; without
+        /// effect in a panorama.
         view_angle: ViewAngle => ViewAngle::Vertical(40.0), written "{ vertical = 40.0 }";
         /// Near plane: its distance along the view direction; surfaces in front of it are
         /// invisible.
@@ -34,6 +39,18 @@ description! {
         aperture: Option<Aperture>, or "a pinhole: everything is in focus";
         /// Plane in focus, perpendicular to the view direction.
         focus: Option<Focus>, or "the plane through `target`";
+    }
+}
+
+choices! {
+    /// Map from directions to the picture.
+    pub enum Projection {
+        /// picture plane in front of the eye
+        Perspective = "perspective",
+        /// panorama of all directions: columns are angles around the camera's upward axis, rows are angles
+        /// from it, as in images of environments. Its film is usually twice as wide as high. It has no
+        /// near plane and no lens
+        Equirectangular = "equirectangular",
     }
 }
 
@@ -95,11 +112,28 @@ impl Camera {
             )),
             _ => None,
         };
-        let checks = self.validator().and(given);
+        let checks = self.validator().and(given).and(self.projection_error());
         if !checks.is_clean() {
             return checks.errors();
         }
         checks.and(self.orientation_error()).and(self.focus_error()).errors()
+    }
+
+    /// Returns a validation error if a panorama has a near plane or a lens.
+    fn projection_error(&self) -> Option<ValidationError> {
+        let given = [
+            ("near", self.near != 0.0),
+            ("aperture", self.aperture.is_some()),
+            ("focus", self.focus.is_some()),
+        ];
+        let (key, _) = given.into_iter().find(|(_, is_given)| *is_given)?;
+        (self.projection == Projection::Equirectangular).then(|| {
+            ValidationError::new(
+                key,
+                format!("{key} is given, but the projection is equirectangular"),
+                "projection = \"perspective\", or neither near nor aperture nor focus",
+            )
+        })
     }
 
     /// Returns a validation error if the target is the eye, or if `up` is parallel to the view
@@ -127,7 +161,7 @@ impl Camera {
 
 #[cfg(test)]
 mod tests {
-    use super::{Camera, ViewAngle};
+    use super::{Aperture, Camera, Focus, Projection, ViewAngle};
 
     fn keys(camera: &Camera) -> Vec<String> {
         camera.faults().into_iter().map(|f| f.key).collect()
@@ -142,6 +176,7 @@ mod tests {
             up: [0.0; 3],
             view_angle: ViewAngle::Vertical(180.0),
             near: -1.0,
+            projection: Projection::Perspective,
             aperture: None,
             focus: None,
         };
@@ -154,6 +189,15 @@ mod tests {
             let camera = Camera { view_angle, ..Camera::at_origin() };
             assert_eq!(keys(&camera), ["view_angle.horizontal"], "{degrees}");
         }
+    }
+
+    #[test]
+    fn panorama_has_no_lens() {
+        let panorama = Camera { projection: Projection::Equirectangular, ..Camera::at_origin() };
+        assert_eq!(keys(&panorama), [""; 0]);
+        let (aperture, focus) = (Some(Aperture::Radius(0.1)), Some(Focus::Distance(2.0)));
+        assert_eq!(keys(&Camera { aperture, ..panorama.clone() }), ["aperture"]);
+        assert_eq!(keys(&Camera { near: 0.1, focus, ..panorama }), ["near"]);
     }
 
     #[test]

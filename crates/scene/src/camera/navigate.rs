@@ -5,9 +5,10 @@
 //! about a millionth of the distance between eye and pivot. Rotations are relative to `up`; the
 //! view direction stays at least 0.1 degrees away from it.
 
-use crate::camera::{Camera, ViewAngle};
+use crate::camera::{Camera, Projection, ViewAngle};
 use crate::value::{round_fine, round_significant, rounded_to, unit};
 use glam::{DMat3, DVec3};
+use std::f64::consts::{PI, TAU};
 
 /// Steepest view up or down, in degrees from the plane perpendicular to `up`.
 const MAX_PITCH: f64 = 89.9;
@@ -33,6 +34,23 @@ impl Camera {
         match self.view_angle {
             ViewAngle::Vertical(_) => [half * width / height, half],
             ViewAngle::Horizontal(_) => [half, half * height / width],
+        }
+    }
+
+    /// Returns a vector from the eye through a point of the picture, a column and a row as fractions of
+    /// its `size` from the upper left corner. Its component along the view is 1 in a perspective.
+    pub fn direction_at(&self, [x, y]: [f64; 2], size: [f64; 2]) -> DVec3 {
+        let [right, up, forward] = self.frame();
+        match self.projection {
+            Projection::Perspective => {
+                let [half_width, half_height] = self.half_size(size);
+                forward + right * (half_width * (2.0 * x - 1.0))
+                    - up * (half_height * (2.0 * y - 1.0))
+            }
+            Projection::Equirectangular => {
+                let ((s, c), (sin, cos)) = ((TAU * (x - 0.5)).sin_cos(), (PI * y).sin_cos());
+                (right * s + forward * c) * sin + up * cos
+            }
         }
     }
 

@@ -324,6 +324,7 @@ mod tests {
                 "aim",
                 "target",
                 "up",
+                "projection",
                 "view_angle",
                 "view_angle.vertical",
                 "near",

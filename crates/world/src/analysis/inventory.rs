@@ -34,7 +34,10 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
     if unsampled > 0 {
         parts.push(format!("{unsampled} of them without sampled points"));
     }
-    parts.extend(present([(scene.camera.lens_radius() > 0.0, "thin lens")]));
+    parts.extend(present([
+        (world.camera.lens.is_some(), "thin lens"),
+        (world.camera.is_panorama(), "panorama"),
+    ]));
     if let Some(limits) = &world.diffuse_limits {
         parts.extend(counted(limits.depth as usize, "diffuse bounce"));
         parts.extend(present([(!limits.caustics, "no caustics")]));

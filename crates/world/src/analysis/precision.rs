@@ -12,7 +12,7 @@ use glam::DVec3;
 use std::ops::Range;
 use zerkalo_kernel::primitive::{BoundingSphere, Form, HalfSpace, Proxy, ProxyFace};
 use zerkalo_scene::Scene;
-use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::camera::CompiledCamera;
 use zerkalo_scene::light::EmissiveSurface;
 use zerkalo_scene::value::{sort_by_number, total_order};
 
@@ -55,7 +55,7 @@ pub(crate) fn single_suffices(scene: &Scene, geometry: &RecenteredGeometry) -> b
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
         return false;
     }
-    let view = PerspectiveCamera::new(&scene.camera, scene.film.size, origin);
+    let view = CompiledCamera::new(&scene.camera, scene.film.size, origin);
     let angle = view.pixel_angle();
     // Distances are measured from the eye, the centre of the lens. An object that is closer to
     // another point of the lens is blurred by more than a pixel, which hides its errors.

@@ -26,7 +26,7 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use zerkalo_kernel::lanes::Float;
 use zerkalo_kernel::primitive::{BoundingSphere, Bounds, Form, box_distance};
 use zerkalo_scene::asset::RadianceMap;
-use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::camera::CompiledCamera;
 use zerkalo_scene::light::{CompiledLight, DeltaLight, Emitter};
 use zerkalo_scene::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
 use zerkalo_scene::{RayTypes, Scene};
@@ -212,7 +212,7 @@ impl<'a> SceneDistances<'a> {
         scene: &Scene,
         geometry: &'a RecenteredGeometry,
         materials_of: impl Fn(usize) -> Vec<&'a Material>,
-        camera: &PerspectiveCamera,
+        camera: &CompiledCamera,
         epsilon: f64,
     ) -> Self {
         let (forms, extent) = (&geometry.forms[..], geometry.extent);

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use zerkalo_kernel::primitive::{F32_RAY_ERROR, Form};
-use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::camera::CompiledCamera;
 
 /// Bounding rectangle of a projected primitive \[pixels\].
 #[derive(Clone, Copy, Debug)]
@@ -23,11 +23,12 @@ const MAX_SLANT_ERROR: f64 = 5e-7;
 
 impl ScreenBounds {
     /// Returns the bounds of the projected corners of an object's bounding box, wider by the
-    /// largest blur of the lens. The bounds are infinite if the object has no bounding box, or if a
-    /// corner of it is not in front of the eye.
-    pub fn project(form: &Form, camera: &PerspectiveCamera) -> Self {
+    /// largest blur of the lens. The bounds are infinite if the object has no bounding box, if a
+    /// corner of it is not in front of the eye, and in a panorama.
+    pub fn project(form: &Form, camera: &CompiledCamera) -> Self {
         let infinite = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
-        let Some((low, high)) = form.bounds() else { return infinite };
+        let bounds = form.bounds().filter(|_| !camera.is_panorama());
+        let Some((low, high)) = bounds else { return infinite };
         let [_, _, forward] = camera.frame;
         let lens_radius = camera.lens_radius();
         let eye = camera.eye.abs() + DVec3::splat(lens_radius);

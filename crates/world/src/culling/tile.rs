@@ -6,7 +6,7 @@ use zerkalo_kernel::lanes::{Float, SimdFloat};
 use zerkalo_kernel::primitive::{
     Aggregate, BoundingSphere, BoundingVolume, Form, Frustum, LightTarget, PrimitiveSet,
 };
-use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::camera::CompiledCamera;
 
 /// Candidates of a group of camera rays, such as those through a tile, and of the shadow rays from
 /// their hit points: the primitives that these rays must be tested against.
@@ -77,7 +77,7 @@ impl<S: Float> Culling<S> {
     pub fn candidates<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
-        camera: &PerspectiveCamera,
+        camera: &CompiledCamera,
         origin: [usize; 2],
         extent: [usize; 2],
     ) -> Option<TileCandidates> {
