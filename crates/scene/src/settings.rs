@@ -13,6 +13,9 @@ description! {
         rays_per_pixel: u32 = 0, in closed(0.0, 1e9) "samples";
         /// Display of light that is brighter than white; the samples stay the same.
         tone: Tone = "clip";
+        /// Light group that is shown alone: a name in `groups`, the name of a light or of an emissive
+        /// material, `ambient` or `background`. The samples stay the same.
+        solo: String, or "all light";
     }
 }
 

@@ -53,6 +53,14 @@ pub(super) struct ShadowRayTarget<S> {
     pub on_surface: Option<OnSurface<S>>,
 }
 
+/// Light groups of the samples in the lanes of a packet.
+#[derive(Clone, Copy)]
+pub(super) enum LaneGroups<L> {
+    All(usize),
+    /// Number of the group in each lane.
+    Each(L),
+}
+
 pub(super) type DeltaSource<S> = LightSource<ShadowRayTarget<S>, S>;
 
 pub(super) type EnvironmentSource<S> = LightSource<EnvironmentLight, S>;

@@ -70,7 +70,7 @@ pub(super) fn switch(
                 next.materials.get_mut(material).ok_or_else(|| EditError::gone(target))?;
             switch_texture(material, key, name);
         }
-        Target::Settings(_) => {}
+        Target::Group(_) | Target::Settings(_) => {}
     }
     let label = label(&next, target, key);
     Ok(Edit::checked(next, target.clone(), label)?.with_note(note))

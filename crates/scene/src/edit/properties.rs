@@ -84,7 +84,11 @@ pub fn rows(scene: &Scene, target: &Target) -> Result<Vec<Property>, EditError> 
     let virtual_kind = match target {
         Target::Light(_) => Some(&KIND),
         Target::Camera | Target::View(_) => Some(&AIM),
-        Target::Object(_) | Target::Part(..) | Target::Material(_) | Target::Settings(_) => None,
+        Target::Object(_)
+        | Target::Part(..)
+        | Target::Group(_)
+        | Target::Material(_)
+        | Target::Settings(_) => None,
     };
     let given = given_key(part, target);
     let hidden_key =

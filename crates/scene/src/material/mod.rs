@@ -83,6 +83,8 @@ description! {
         emission: f64 = 0.0, in LIGHT "W/(sr m²)";
         /// Colour of the emitted light; multiplies `emission`.
         emission_color: Color = [1.0, 1.0, 1.0], in LIGHT;
+        /// Light group in which the emission is mixed with other lights.
+        group: String, or "a group of its own";
         /// `true`: the back of a surface has the same material as its front. `false`: the back is
         /// black. Only its `transmission` remains, and total internal reflection unless `fresnel`
         /// is `dielectric`.

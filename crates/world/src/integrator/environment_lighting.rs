@@ -15,7 +15,7 @@ use crate::integrator::indirect_diffuse::NO_PDF;
 use crate::integrator::nested_dielectrics::{Media, attenuated};
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
-use crate::world::{EnvironmentSource, LightSource, World};
+use crate::world::{EnvironmentSource, LaneGroups, LightSource, World};
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Frame, Mask, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp;
@@ -119,7 +119,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             vertex.shadow(occluded, &ray, t_max, vertex.media)
         };
         let lit = value.max_element().gt(L::zero());
-        self.add_light(environment.group, lit, shadow, |vertex, _| {
+        self.add_light(LaneGroups::All(environment.group), lit, shadow, |vertex, _| {
             environment.emitted(vertex.path.throughput.component_mul(value))
         });
     }
