@@ -221,7 +221,10 @@ fn d13_named_groups() {
     let changes: [(&str, Change); 4] = [
         ("a group dimmed", &|s| s.groups.get_mut("left").unwrap().intensity = 0.1),
         ("another colour", &|s| s.groups.get_mut("right").unwrap().color = Color::WHITE),
-        ("a group off", &|s| s.groups.get_mut("left").unwrap().on = false),
+        ("both groups", &|s| {
+            s.groups.get_mut("left").unwrap().color = Color([0.2, 0.9, 0.4]);
+            s.groups.get_mut("right").unwrap().intensity = 0.3;
+        }),
         ("the lone lamp brighter", &|s| s.lights[0].intensity = 0.5),
     ];
     row("named-groups.toml", |tested| same(&mixed(tested), &expected), &changes);
@@ -237,6 +240,8 @@ fn d13_named_groups() {
     others_off.groups.get_mut("left").unwrap().on = false;
     others_off.lights[0].on = false;
     same(&mixed(&alone), &mixed(&others_off)).unwrap();
+    let black = groups.weights(&alone).iter().filter(|weight| **weight == [0.0; 3]).count();
+    assert_eq!(black, 2, "the others are black");
     let mut apart = small(&original);
     apart.lights[1].intensity *= 2.0;
     assert!(!groups.can_reuse(kept.scene(), &apart));

@@ -67,6 +67,9 @@ description! {
         /// Caustics: after a diffuse bounce, too, mirrors reflect and glass transmits light. `false`
         /// leaves this light out.
         caustics: bool = true;
+        /// Clear flat mirrors reflect each light once more, onto the surfaces in front of them, also
+        /// without diffuse bounces.
+        mirror_light: bool = false;
         /// Smallest throughput of a path; a path with less ends.
         min_throughput: f64 = 0.0, in SHARE;
         /// Treatment of sampled reflections below the surface's horizon.

@@ -196,15 +196,10 @@ impl Tile {
         }
     }
 
-    /// Adds non-negative `values` to the sums of one light group, as [`Tile::add`] does. The first group
-    /// of a sample is added before the others.
+    /// Adds non-negative `values` to the sums of one light group, as [`Tile::add`] does.
     #[inline(always)]
     pub fn add_group(&mut self, replicate: usize, pixel: usize, group: usize, values: [i64; 3]) {
-        let sums = match group {
-            0 => &mut self.pixel_mut(replicate, pixel)[..3],
-            // The sums of the first group have been written.
-            _ => &mut self.sums[(replicate * TILE_PIXELS + pixel) * self.stride + 3 * group..][..3],
-        };
+        let sums = &mut self.pixel_mut(replicate, pixel)[3 * group..][..3];
         // A sum of non-negative numbers is negative if it has overflowed.
         let new = [0, 1, 2].map(|c| sums[c].wrapping_add(values[c]));
         let fit = new[0] | new[1] | new[2] >= 0;

@@ -55,6 +55,7 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
         (groups.contains(&LightGroupSource::Ambient), "ambient"),
         (groups.contains(&LightGroupSource::Background), "background"),
         (passes && has_lights, "shadow rays through clear panes"),
+        (!world.mirrors.is_empty(), "mirror light"),
         (ray_types == RayTypes::Primary, "no shadows"),
         (ray_types == RayTypes::Shadows && has_lights, "shadows only"),
         (scene.film.filter == Filter::Point, "no anti-aliasing"),

@@ -70,7 +70,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
 
     /// Returns the lanes with a diffuse part or highlights that face the light from `wi`.
     #[inline(always)]
-    fn facing<const SIMPLE: bool>(&self, wi: Vec3<L>) -> L::Mask {
+    pub fn facing<const SIMPLE: bool>(&self, wi: Vec3<L>) -> L::Mask {
         let interaction = self.interaction;
         let mut facing = interaction.direct_mask & interaction.normal.dot(wi).gt(L::zero());
         if !SIMPLE && self.world.smooth {
