@@ -335,7 +335,7 @@ mod tests {
                 "focus"
             ]
         );
-        assert_eq!(keys(&Target::Light(0))[..3], ["name", "kind", "point.position"]);
+        assert_eq!(keys(&Target::Light(0))[..4], ["name", "group", "kind", "point.position"]);
         let radius = row(&scene, &Target::Object(2), "shape.sphere.radius");
         assert_eq!((radius.value.as_str(), radius.components.len()), ("0.5", 1));
         assert_eq!((radius.unit, radius.depth, radius.is_default), ("scene units", 1, false));

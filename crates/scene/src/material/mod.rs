@@ -323,7 +323,7 @@ mod tests {
             "emission_color",
         ];
         assert_eq!(keys, numbers);
-        assert_eq!(FIELDS.len(), numbers.len() + 9, "check the range of the new field here");
+        assert_eq!(FIELDS.len(), numbers.len() + 10, "check the range of the new field here");
         bad = Material { metal: Some(Metal::Gold), ..Material::default() };
         assert!(bad.faults().is_empty());
         bad.f0 = Some(Color::WHITE);
