@@ -35,6 +35,8 @@ fn base() -> Scene {
         bump.image = { file = \"scenes/textures/brick-heights.png\", height = 0.2 }
         [materials.checked]
         texture.checker = { even = [0.9, 0.9, 0.1], odd = [0.1, 0.1, 0.9], scale = [3.0, 3.0] }
+        [groups.left]
+        intensity = 0.7
         [[light]]
         name = \"lamp\"
         point = { position = [2.0, 6.0, 8.0] }
@@ -48,6 +50,14 @@ fn base() -> Scene {
         name = \"off\"
         point = { position = [-4.0, 4.0, 6.0] }
         on = false
+        [[light]]
+        point = { position = [-5.0, 5.0, 4.0] }
+        intensity = 0.2
+        group = \"left\"
+        [[light]]
+        point = { position = [-5.0, 1.0, 5.0] }
+        color = [0.2, 0.3, 0.1]
+        group = \"left\"
         [[object]]
         name = \"die\"
         material = \"matte\"
@@ -183,7 +193,7 @@ fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value
         }
         ValueType::Named(_) => {
             let mut named = old?.as_table()?.clone();
-            let name = named.keys().nth(numbers.below(named.len()))?.clone();
+            let name = named.keys().nth(numbers.below(named.len().max(1)))?.clone();
             let value = named.remove(&name)?;
             if numbers.below(2) == 0 {
                 named.insert(format!("{name} too"), value);
@@ -263,7 +273,7 @@ fn relit_film_equals_render_of_the_edited_scene() {
     }
     // Several edits at once. Four of five are of keys that often allow relighting.
     let mild = |key: &&Key| {
-        matches!(key.path[0].as_str(), "light" | "ambient" | "background" | "materials")
+        matches!(key.path[0].as_str(), "light" | "groups" | "ambient" | "background" | "materials")
     };
     let mild: Vec<&Key> = all.iter().filter(mild).collect();
     for round in 0..200 {

@@ -22,7 +22,14 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let scene = document.scene();
     let world = AnyWorld::compile(scene, &world::Options::default());
     let size = scene.film.size;
-    let groups = world.info().groups.names(scene);
+    let sizes = world.info().groups.members.iter().map(|group| group.emitting().len());
+    let names = world.info().groups.names(scene).into_iter();
+    let with_size = |(name, lights)| match lights {
+        0 | 1 => name,
+        _ if name == format!("{lights} lights") => name,
+        _ => format!("{name} ({lights} lights)"),
+    };
+    let groups: Vec<String> = names.zip(sizes).map(with_size).collect();
     let mut warnings: Vec<_> = document.warnings.iter().map(ToString::to_string).collect();
     if let Err(reason) = memory_budget::check(size, groups.len(), 0) {
         warn(&format!("warning: {reason}."));

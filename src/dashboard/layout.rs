@@ -149,7 +149,8 @@ impl Model {
         // one of them only.
         let left = rows - plot;
         let scene = self.scene();
-        let parts = [scene.objects.len(), scene.lights.len(), scene.materials.len()];
+        let lights = scene.groups.len() + scene.lights.len();
+        let parts = [scene.objects.len(), lights, scene.materials.len()];
         let headings = 3 + parts.iter().filter(|n| **n > 0).count();
         let unfolded: usize = self.unfolded.iter().map(|whole| whole.parts(scene).len()).sum();
         // Camera, ambient light, background, film and integrator.

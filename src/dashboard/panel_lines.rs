@@ -157,6 +157,16 @@ pub fn outline(scene: &Scene, unfolded: &BTreeSet<Target>) -> Vec<OutlineLine> {
                 if views <= 9 { format!("key {views}") } else { String::new() }
             }
             Target::Light(i) if !scene.lights[*i].on => "off".to_string(),
+            Target::Light(i) => truncated(&scene.lights[*i].group),
+            Target::Group(name) if !scene.groups[name].on => "off".to_string(),
+            Target::Group(name) if *name == scene.film.solo => "alone".to_string(),
+            Target::Group(name) => {
+                let named = |group: &&String| *group == name;
+                let lights = scene.lights.iter().map(|light| &light.group).filter(named).count();
+                let glowing = scene.materials.values().filter(|material| material.emits());
+                let glowing = glowing.map(|material| &material.group).filter(named).count();
+                format!("{} lights", lights + glowing)
+            }
             Target::Object(_) | Target::Part(..) => own_material(scene, &target),
             _ => String::new(),
         };

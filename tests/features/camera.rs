@@ -152,7 +152,7 @@ fn d1_thin_lens() {
 }
 
 #[test]
-fn d13_panorama() {
+fn d15_panorama() {
     let original = shipped("panorama.toml");
     row(
         "panorama.toml",

@@ -179,3 +179,72 @@ fn d11_many_lights() {
     assert!(bulbs.faults().is_empty(), "{}", bulbs.faults()[0]);
     agrees(&bulbs, &bulbs, REFERENCE_SAMPLES).unwrap();
 }
+
+/// Returns `scene` without named groups: their mixes are in the emissions of their lights.
+fn ungrouped(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    let groups = std::mem::take(&mut scene.groups);
+    let mixed = |group: &mut String, color: &mut Color| {
+        let factor = groups.get(&std::mem::take(group)).map_or([1.0; 3], |group| group.factor());
+        color.0.iter_mut().zip(factor).for_each(|(channel, factor)| *channel *= factor);
+    };
+    scene.lights.iter_mut().for_each(|light| mixed(&mut light.group, &mut light.color));
+    let materials = scene.materials.values_mut();
+    materials.for_each(|material| mixed(&mut material.group, &mut material.emission_color));
+    scene
+}
+
+/// Checks that the film of the scene, mixed for other groups, equals a render of lights with these
+/// emissions: the samples are the same, and the sums differ by rounding.
+#[test]
+fn d13_named_groups() {
+    let small = |scene: &Scene| sized(scene.clone(), [64, 48]);
+    let fresh = |scene: &Scene| {
+        let rendering = rendered(&small(&ungrouped(scene)), 4, Precision::Single, 4);
+        picture(&rendering, Replicates::Both)
+    };
+    let original = shipped("named-groups.toml");
+    let kept = rendered(&small(&original), 4, Precision::Single, 4);
+    let groups = &kept.world.info().groups;
+    assert_eq!(groups.names(&original), ["left", "right", "lone"]);
+    let mixed = |scene: &Scene| {
+        let mix = LightWeights { weights: groups.weights(scene) };
+        let rows = 0..kept.film.header.height;
+        rows.flat_map(|y| kept.film.row(y, Replicates::Both, &mix)).collect::<Vec<_>>()
+    };
+    let same = |of: &[[f64; 3]], other: &[[f64; 3]]| {
+        let differences = of.as_flattened().iter().zip(other.as_flattened());
+        let largest = differences.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        ensure(largest < 1e-5, || format!("they differ by {largest}"))
+    };
+    let expected = fresh(&original);
+    let changes: [(&str, Change); 4] = [
+        ("a group dimmed", &|s| s.groups.get_mut("left").unwrap().intensity = 0.1),
+        ("another colour", &|s| s.groups.get_mut("right").unwrap().color = Color::WHITE),
+        ("both groups", &|s| {
+            s.groups.get_mut("left").unwrap().color = Color([0.2, 0.9, 0.4]);
+            s.groups.get_mut("right").unwrap().intensity = 0.3;
+        }),
+        ("the lone lamp brighter", &|s| s.lights[0].intensity = 0.5),
+    ];
+    row("named-groups.toml", |tested| same(&mixed(tested), &expected), &changes);
+    for (what, change) in changes {
+        let mut scene = original.clone();
+        change(&mut scene);
+        assert!(groups.can_reuse(kept.scene(), &small(&scene)), "{what} needs new samples");
+        same(&mixed(&scene), &fresh(&scene)).unwrap_or_else(|e| panic!("{what}: {e}"));
+    }
+    let mut alone = original.clone();
+    alone.film.solo = "right".to_string();
+    let mut others_off = original.clone();
+    others_off.groups.get_mut("left").unwrap().on = false;
+    others_off.lights[0].on = false;
+    same(&mixed(&alone), &mixed(&others_off)).unwrap();
+    let black = groups.weights(&alone).iter().filter(|weight| **weight == [0.0; 3]).count();
+    assert_eq!(black, 2, "the others are black");
+    let mut apart = small(&original);
+    apart.lights[1].intensity *= 2.0;
+    assert!(!groups.can_reuse(kept.scene(), &apart));
+    let reason = groups.restart_reason(kept.scene(), &apart).unwrap();
+    assert!(reason.contains("11 lights of left"), "{reason}");
+}

@@ -3,6 +3,7 @@
 use crate::features::row::*;
 use crate::harness::*;
 use crate::reference::*;
+use zerkalo_scene::light::SphereLight;
 use zerkalo_scene::material::Metal;
 
 /// Checks that the picture of `file` agrees exactly with the reference tracer. The picture of each
@@ -271,4 +272,82 @@ fn d3_indirect_diffuse() {
     let mut ambient = shipped("mirror-room.toml");
     ambient.trace.max_diffuse_depth = 1;
     agrees(&ambient, &ambient, 96).unwrap_or_else(|e| panic!("ambient light: {e}"));
+}
+
+/// Checks the light that a tilted mirror throws on a wall against the closed form: that of a light
+/// behind the mirror, seen through it.
+#[test]
+fn d14_mirror_light() {
+    let lines: Vec<Line> = (0..60 * 40)
+        .map(|i| (f64::from(i % 60) * 0.05 - 1.5, 0.1 + f64::from(i / 60) * 0.05))
+        .map(|(x, y)| (DVec3::new(x, y, -2.9), -DVec3::Z))
+        .collect();
+    let (center, normal) = (DVec3::new(0.0, 0.45, 1.5), DVec3::new(0.0, 1.0, -0.6).normalize());
+    let across = normal.cross(DVec3::X);
+    // Radiance of the wall, and the distance from the edge of the patch, outside less than 0.
+    let thrown = |scene: &Scene, point: DVec3| {
+        let light = &scene.lights[0];
+        let (to_image, strength) = match light.position() {
+            None => (-DVec3::from(light.direction().unwrap()).normalize(), 1.0),
+            Some(position) => (DVec3::from(position) - center, 1.0 / PI),
+        };
+        let mirrored = to_image - 2.0 * to_image.dot(normal) * normal;
+        let (wi, falling) = match light.position() {
+            None => (mirrored, 1.0),
+            Some(_) => {
+                let to_image = center + mirrored - point;
+                (to_image.normalize(), to_image.length_squared().recip())
+            }
+        };
+        let on_mirror = point + wi * ((center - point).dot(normal) / wi.dot(normal)) - center;
+        let inside = 0.35 - on_mirror.x.abs().max(on_mirror.dot(across).abs());
+        let color = light.color.scaled(light.intensity).0;
+        let albedo = scene.materials["wall"].color.0;
+        let scale = 0.9 * strength * falling * wi.z;
+        ([0, 1, 2].map(|i| color[i] * albedo[i] * scale), inside)
+    };
+    let check = |original: &Scene, tested: &Scene| {
+        let mut plain = original.clone();
+        plain.trace.mirror_light = false;
+        let [with, without] =
+            [tested, &plain].map(|scene| Traced::new(scene, Precision::Double).radiance(&lines));
+        let mut found = 0;
+        for ((with, without), (origin, direction)) in with.iter().zip(without).zip(&lines) {
+            let (expected, inside) = thrown(original, *origin + *direction * 0.1);
+            let expected = if inside > 0.0 { expected } else { [0.0; 3] };
+            found += usize::from(inside > 0.0);
+            let apart = (0..3).map(|i| (with[i] - without[i] - expected[i]).abs());
+            let apart = if inside.abs() < 1e-6 { 0.0 } else { apart.fold(0.0, f64::max) };
+            ensure(apart < 1e-5, || format!("at {origin}: {apart}"))?;
+        }
+        ensure(found > 30, || format!("only {found} points in the patch"))
+    };
+    let original = shipped("mirror-light.toml");
+    let mut lamp = original.clone();
+    lamp.lights[0].kind = Point { position: [-0.1, 2.5, 2.7] }.into();
+    lamp.lights[0].falloff = Falloff::InverseSquare;
+    check(&lamp, &lamp).unwrap_or_else(|e| panic!("point light: {e}"));
+    row(
+        "mirror-light.toml",
+        |tested| check(&original, tested),
+        &[
+            ("no light thrown", &|s| s.trace.mirror_light = false),
+            ("a darker mirror", &|s| material(s, "mirror").reflection = 0.8),
+            ("no shadows", &|s| s.trace.ray_types = RayTypes::Primary),
+            ("a smaller mirror", &|s| {
+                let wall = "rectangle = { center = [0.0, 0.45, 1.5], size = [0.6, 0.7], normal = [0.0, 1.0, -0.6] }";
+                object(s, "mirror").shape = shape(wall);
+            }),
+        ],
+    );
+    // A mirror throws all light that a bounce finds in it, and nothing counts twice.
+    let mut sphere = sized(lamp, [8, 6]);
+    sphere.camera.eye = [0.3, 1.6, 1.0];
+    sphere.camera.target = Some([0.2, 0.4, -3.0]);
+    let ball = SphereLight { center: [-0.1, 2.5, 2.7], radius: 0.12 };
+    sphere.lights[0] = Light { intensity: 30.0, ..Light::new(ball) };
+    sphere.trace.max_diffuse_depth = 1;
+    let mut without_caustics = sphere.clone();
+    without_caustics.trace.caustics = false;
+    means_agree("lamp in a mirror", &sphere, &without_caustics, 2048);
 }

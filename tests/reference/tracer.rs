@@ -137,6 +137,9 @@ impl<'a> Tracer<'a> {
         let absorbs = scene.materials.values().any(|m| m.attenuation_color != Color::WHITE);
         let mut tracer =
             Self { scene, bodies, lamps, shines, media, images, materials, absorbs, mutation };
+        if scene.trace.mirror_light {
+            return Err("light that mirrors throw".to_string());
+        }
         if scene.lights.iter().any(|l| l.environment().is_some_and(|e| e.file().is_some())) {
             return Err("an image around the scene".to_string());
         }

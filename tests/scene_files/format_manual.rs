@@ -79,8 +79,16 @@ and every key with a default may be left out. Unknown keys are errors.
   sides of a flat object emit, and the inside of a solid; otherwise the front alone. The materials have
   light groups as lights have: `emission` and `emission_color` of a scene in progress change without
   new samples, to 0 and back. Beyond eight lights and emissive materials the last ones share a group.
-  Sixteen point lights or more share one group. Spots do if their cones have together the solid angle
-  of 16 hemispheres or more.
+  Sixteen point lights or more without a `group` share one group. Spots do if their cones have together
+  the solid angle of 16 hemispheres or more.
+- Lights and materials with the same `group` are one light group, which has a place among the eight before
+  all others. Its mix, `groups.NAME` with `intensity`, `color` and `on`, changes without new samples, also with
+  hundreds of lights; the light of a lamp is multiplied by both. A lamp that shares its group needs new
+  samples for another intensity or colour of its own. `film.solo` shows one light group alone.
+- With `trace.mirror_light` clear flat mirrors (rectangles, platforms, planes, sides of boxes and prisms, without
+  bumps) throw the light of each light once more, as direct light. Rough mirrors, environments, the lights
+  among which paths choose (16 or more), and lights with a size beside transmission are left to diffuse
+  bounces with `caustics`, which find lights with a size only.
 - Diffuse surfaces, highlights and rough mirrors get the light of emissive spheres, rectangles, platforms,
   boxes, cubes, prisms, pyramids and meshes of up to 65536 triangles from points sampled on them, as
   that of lights with a size. The emission of other shapes (torus, cylinder, cone, plane, compound,

@@ -166,6 +166,10 @@ fn light_and_mirror_stories() -> Vec<Story> {
         story("light brighter, fine", "Alt-'", |_, d| (1.04..1.06).contains(&lamp(d).intensity)),
         story("light darker, fine", "Alt-;", |_, d| (0.95..0.999).contains(&lamp(d).intensity)),
         story("light on or off", "L", |_, d| !lamp(d).on),
+        story("light group alone, or all light", "Alt-l", |_, d| d.scene().film.solo == "lamp"),
+        story("light group alone, or all light", "Alt-l Alt-l", |_, d| {
+            d.scene().film.solo.is_empty()
+        }),
         story("add a light", "A Enter Enter", |_, d| {
             d.scene().lights.len() == 2 && d.model.selection == Target::Light(1)
         }),

@@ -229,6 +229,25 @@ fn light_intensity_is_reported_and_selection_stays() {
 }
 
 #[test]
+fn lights_of_a_group_are_selected_mixed_and_renamed_together() {
+    let lamp =
+        |x: i32| format!("\n[[light]]\npoint.position = [{x}.0, 3.0, 0.0]\ngroup = \"left\"\n");
+    let mut desk = Desk::new(&(ROOM.to_string() + &lamp(1) + &lamp(2)));
+    desk.keys("l ' Alt-l");
+    assert_eq!(desk.model.selection, Target::Group("left".to_string()));
+    assert!(desk.notice().starts_with("Only left"), "{}", desk.notice());
+    assert!(desk.scene().groups["left"].intensity > 1.05 && desk.scene().film.solo == "left");
+    desk.keys("l");
+    assert_eq!(desk.model.selection, Target::Light(0), "lights of a group are not single lights");
+    desk.keys("l e Ctrl-u `stage` Enter");
+    let groups: Vec<&String> = desk.scene().lights.iter().map(|light| &light.group).collect();
+    assert_eq!(groups, ["", "stage", "stage"]);
+    assert_eq!(desk.scene().film.solo, "stage");
+    desk.keys("x");
+    assert!(desk.scene().groups.is_empty() && desk.scene().lights[1].group.is_empty());
+}
+
+#[test]
 fn editing_works_at_every_terminal_size() {
     for screen in [[200, 60], [120, 36], [80, 24], [40, 12], [39, 11], [1, 1], [0, 0]] {
         let mut desk = desk(BALL, "");

@@ -1,7 +1,7 @@
 //! Undo and redo of whole scenes, and coalescing of successive edits into one undo step.
 
 use crate::camera::Camera;
-use crate::light::Light;
+use crate::light::{Light, LightGroup};
 use crate::material::Material;
 use crate::{Object, Scene};
 use std::collections::VecDeque;
@@ -132,6 +132,7 @@ fn bytes(scene: &Scene) -> usize {
         + scene.objects.len() * (size_of::<Object>() + 128)
         + scene.lights.len() * (size_of::<Light>() + 16)
         + scene.materials.len() * (size_of::<Material>() + 32)
+        + scene.groups.len() * (size_of::<LightGroup>() + 32)
         + scene.cameras.len() * (size_of::<Camera>() + 32)
 }
 

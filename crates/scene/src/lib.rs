@@ -46,7 +46,7 @@ pub use settings::{
 pub use validate::Problem;
 
 use crate::camera::Camera;
-use crate::light::Light;
+use crate::light::{Light, LightGroup};
 use crate::material::Material;
 use crate::value::{FieldValue, KeyNode, ValueType, children};
 use std::collections::BTreeMap;
@@ -66,6 +66,8 @@ pub struct Scene {
     pub background: Background,
     /// Ambient light: uniform, without shadows.
     pub ambient: Ambient,
+    /// Mixes of light groups, by name.
+    pub groups: BTreeMap<String, LightGroup>,
     /// Lights of the scene, in the order of the file.
     pub lights: Vec<Light>,
     /// Materials of the scene, by name.
@@ -85,6 +87,7 @@ impl Default for Scene {
             cameras: BTreeMap::new(),
             background: Background::default(),
             ambient: Ambient::default(),
+            groups: BTreeMap::new(),
             lights: Vec::new(),
             materials: BTreeMap::new(),
             objects: Vec::new(),
@@ -105,6 +108,7 @@ impl KeyNode for Scene {
         "cameras" => cameras,
         "background" => background,
         "ambient" => ambient,
+        "groups" => groups,
         "light" => lights,
         "materials" => materials,
         "object" => objects

@@ -13,6 +13,9 @@ description! {
         rays_per_pixel: u32 = 0, in closed(0.0, 1e9) "samples";
         /// Display of light that is brighter than white; the samples stay the same.
         tone: Tone = "clip";
+        /// Light group that is shown alone: a name in `groups`, the name of a light or of an emissive
+        /// material, `ambient` or `background`. The samples stay the same.
+        solo: String, or "all light";
     }
 }
 
@@ -64,6 +67,9 @@ description! {
         /// Caustics: after a diffuse bounce, too, mirrors reflect and glass transmits light. `false`
         /// leaves this light out.
         caustics: bool = true;
+        /// Clear flat mirrors reflect each light once more, onto the surfaces in front of them, also
+        /// without diffuse bounces.
+        mirror_light: bool = false;
         /// Smallest throughput of a path; a path with less ends.
         min_throughput: f64 = 0.0, in SHARE;
         /// Treatment of sampled reflections below the surface's horizon.

@@ -47,6 +47,7 @@ pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<Stri
         }
         [list, name, ..] if list == "materials" => format!("material \"{}\"", truncated(name)),
         [list, name, ..] if list == "cameras" => format!("camera \"{}\"", truncated(name)),
+        [list, name, ..] if list == "groups" => format!("group \"{}\"", truncated(name)),
         [first, ..] => first.clone(),
         [] => String::new(),
     }
@@ -107,8 +108,14 @@ impl Scene {
     }
 
     /// Loads the files that the scene refers to and that are not loaded yet, if they fit into memory
-    /// together. Unreadable files are errors in the next validation.
+    /// together. Unreadable files are errors in the next validation. Adds the light groups that lights
+    /// and materials name.
     pub fn resolve(&mut self) {
+        let of_lights = self.lights.iter().map(|light| &light.group);
+        let named = of_lights.chain(self.materials.values().map(|material| &material.group));
+        for name in named.filter(|name| !name.is_empty()) {
+            self.groups.entry(name.clone()).or_default();
+        }
         let resolver = self.resolver.clone();
         let files: Vec<_> = self.files().map(|(kind, name)| (kind, resolver.path(name))).collect();
         let refused = LazyCell::new(|| resolver.assets.check_total_memory(&files).err());
@@ -139,6 +146,9 @@ impl Scene {
         }
         problems.add(&["background"], self.background.validator().errors());
         problems.add(&["ambient"], self.ambient.validator().errors());
+        for (name, group) in &self.groups {
+            problems.add(&["groups", name], group.validator().errors());
+        }
         for (i, light) in self.lights.iter().enumerate() {
             problems.add(&["light", &i.to_string()], light.faults());
         }

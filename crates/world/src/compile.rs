@@ -8,6 +8,7 @@ use crate::any_world::Precision;
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::culling::tile::{Culling, CullingMode, FrustumCuller, LightBounds, TileCandidates};
 use crate::integrator::indirect_diffuse::{DiffuseLimits, MIN_WALK};
+use crate::integrator::mirror_light::FlatMirror;
 use crate::integrator::nested_dielectrics::{NestedDielectrics, may_reach};
 use crate::integrator::surface_textures::SurfaceTextures;
 use crate::lights::choice::LightChoice;
@@ -353,6 +354,23 @@ impl<S: Float> CompiledLights<S> {
     }
 }
 
+/// Returns the clear flat mirrors among the primitives, for `mirror_light`.
+fn flat_mirrors<S: Float>(
+    geometry: &RecenteredGeometry,
+    primitives: &[PrimitiveId],
+    materials: &CompiledMaterials<S>,
+    lift: f64,
+) -> Vec<FlatMirror<S>> {
+    let faces = |(primitive, id): (u32, &PrimitiveId)| {
+        let material = materials.materials[materials.index(id) as usize];
+        let faces = MirrorFace::all_of(&geometry.forms[id.form], material).into_iter();
+        faces
+            .filter(|face| face.is_clear() && material.bump.is_none())
+            .map(move |face| FlatMirror::new(primitive, &face, lift))
+    };
+    (0..).zip(primitives).flat_map(faces).collect()
+}
+
 /// Compiles the method that finds the candidates of rays.
 fn culling<L: SimdFloat>(
     scene: &Scene,
@@ -488,6 +506,11 @@ impl<L: SimdFloat> World<L> {
             NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, &start);
         let nested = nested_dielectrics.as_ref();
         let outside_only = outside_only(&recentered.forms, primitives, &start, nested);
+        let lift = emitter_lift::<L::Scalar>(recentered);
+        let mirrors = match scene.trace.mirror_light && scene.trace.ray_types == RayTypes::Full {
+            true => flat_mirrors(recentered, primitives, &materials, lift),
+            false => Vec::new(),
+        };
         let bounds = lights.bounds();
         let culling = culling(scene, recentered, &geometry, &camera, bounds, &outside_only);
         let smooth = geometry.is_smooth() || textures.is_bumped();
@@ -496,13 +519,18 @@ impl<L: SimdFloat> World<L> {
         Self {
             smooth,
             colored,
-            simple: !smooth && !colored && !lights.has_emitters() && geometry.is_plain_list(),
+            simple: !smooth
+                && !colored
+                && mirrors.is_empty()
+                && !lights.has_emitters()
+                && geometry.is_plain_list(),
             surface_textures: textures,
             shadows: scene.trace.ray_types >= RayTypes::Shadows && !geometry.is_empty(),
             depth: if materials.has_secondary() { scene.trace.max_depth } else { 0 },
             diffuse_limits: materials.diffuse_limits(scene),
             min_throughput: scene.trace.min_throughput,
             fold: scene.trace.below_horizon == BelowHorizon::Fold,
+            mirrors,
             nested_dielectrics,
             geometry,
             objects: recentered.objects.clone(),

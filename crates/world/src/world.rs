@@ -4,6 +4,7 @@ use crate::any_world::Precision;
 use crate::compile::CompiledLights;
 use crate::culling::tile::{Culling, TileCandidates};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
+use crate::integrator::mirror_light::FlatMirror;
 use crate::integrator::nested_dielectrics::NestedDielectrics;
 use crate::integrator::surface_textures::SurfaceTextures;
 use crate::lights::groups::LightGroups;
@@ -53,6 +54,14 @@ pub(super) struct ShadowRayTarget<S> {
     pub on_surface: Option<OnSurface<S>>,
 }
 
+/// Light groups of the samples in the lanes of a packet.
+#[derive(Clone, Copy)]
+pub(super) enum LaneGroups<L> {
+    All(usize),
+    /// Number of the group in each lane.
+    Each(L),
+}
+
 pub(super) type DeltaSource<S> = LightSource<ShadowRayTarget<S>, S>;
 
 pub(super) type EnvironmentSource<S> = LightSource<EnvironmentLight, S>;
@@ -87,6 +96,8 @@ pub struct World<L: SimdFloat> {
     /// worlds.
     pub(super) simple: bool,
     pub(super) surface_textures: SurfaceTextures<L>,
+    /// Mirrors that throw light; empty without `mirror_light`.
+    pub(super) mirrors: Vec<FlatMirror<L::Scalar>>,
     pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
     /// Largest number of surfaces on a path after the first; 0 if no surface reflects or transmits.
     pub(super) depth: u32,

@@ -14,23 +14,55 @@ impl UpdateContext<'_> {
         let target = edit.as_ref().ok().map(|edit| edit.target.clone());
         self.commit(edit, coalesce);
         if let Some(values) = target.and_then(|target| values(self.scene(), &target)) {
-            self.say(values);
+            let reason = self.restart_reason().map(|reason| format!(" · {reason}"));
+            self.say(values + &reason.unwrap_or_default());
         }
     }
 
+    /// Returns why the lights of the scene need new samples; `None` if they do not.
+    pub(super) fn restart_reason(&self) -> Option<String> {
+        let lighting = self.model.snapshot.as_ref()?.lighting.as_ref()?;
+        lighting.groups.restart_reason(&lighting.compiled, self.scene())
+    }
+
+    /// Selects the next light group, or light without a given group.
     pub(super) fn next_light(&mut self) {
-        let lights = self.scene().lights.len();
-        if lights == 0 {
-            self.say("There is no light · A adds one");
-            return;
-        }
-        let next = match self.model.selection {
-            Target::Light(i) => (i + 1) % lights,
-            _ => 0,
+        let is_grouped = |i: &usize| !self.scene().lights[*i].group.is_empty();
+        let mut lights: Vec<_> =
+            self.scene().groups.keys().map(|name| Target::Group(name.clone())).collect();
+        let single = (0..self.scene().lights.len()).filter(|i| !is_grouped(i));
+        lights.extend(single.map(Target::Light));
+        let current = lights.iter().position(|light| *light == self.model.selection);
+        let next = current.map_or(0, |current| current + 1) % lights.len().max(1);
+        let Some(next) = lights.into_iter().nth(next) else {
+            return self.say("There is no light · A adds one");
         };
-        self.select(Target::Light(next));
+        let move_key = if matches!(next, Target::Light(_)) { " · m move" } else { "" };
+        self.select(next);
         let label = self.model.selection.label(self.scene());
-        self.say(format!("{label} · ; ' dim, brighten · L on, off · m move"));
+        self.say(format!("{label} · ; ' dim, brighten · L on, off · Alt-l alone{move_key}"));
+    }
+
+    /// Shows the light group of the selection alone, or all light again.
+    pub(super) fn solo(&mut self) {
+        let scene = self.scene();
+        let own = self.model.selection.light_group(scene);
+        let name = own.or_else(|| self.target_light().ok()?.light_group(scene));
+        let name = name.filter(|name| *name != scene.film.solo).unwrap_or_default();
+        let lighting = self.model.snapshot.as_ref().and_then(|snapshot| snapshot.lighting.as_ref());
+        let names = lighting.map(|lighting| lighting.groups.names(scene));
+        if !name.is_empty() && names.is_some_and(|names| !names.contains(&name)) {
+            return self.refuse(&format!("{name} is dark, or not apart from other lights"));
+        }
+        let notice = match name.as_str() {
+            "" => "All light".to_string(),
+            name => format!("Only {name} · Alt-l all light"),
+        };
+        let film = Target::Settings(SceneSettings::Film);
+        let edit = edit::set(scene, &film, "solo", &name);
+        if self.commit(edit, Coalesce::Single) {
+            self.say(notice);
+        }
     }
 
     /// Returns the light that commands change: the selection if it is a light, the ambient light or
@@ -38,6 +70,7 @@ impl UpdateContext<'_> {
     fn target_light(&self) -> Result<Target, EditError> {
         match &self.model.selection {
             s @ (Target::Light(_)
+            | Target::Group(_)
             | Target::Settings(SceneSettings::Ambient | SceneSettings::Background)) => {
                 Ok(s.clone())
             }
@@ -48,7 +81,7 @@ impl UpdateContext<'_> {
 
     pub(super) fn intensity(&mut self, steps: f64) {
         let edit = self.target_light().and_then(|light| {
-            let key = if matches!(light, Target::Light(_)) { "intensity" } else { "color" };
+            let key = if matches!(light, Target::Settings(_)) { "color" } else { "intensity" };
             edit::step(self.scene(), &light, key, None, steps)
         });
         self.adjust(edit, Coalesce::Repeat);
@@ -56,7 +89,7 @@ impl UpdateContext<'_> {
 
     pub(super) fn switch_light(&mut self) {
         let edit = self.target_light().and_then(|light| match light {
-            Target::Light(_) => edit::toggle(self.scene(), &light, "on", true),
+            Target::Light(_) | Target::Group(_) => edit::toggle(self.scene(), &light, "on", true),
             other => {
                 let found = format!("{} has no switch", other.label(self.scene()));
                 Err(EditError::new(found, "Black is off."))
@@ -119,12 +152,18 @@ impl UpdateContext<'_> {
 /// for other parts of the scene.
 fn values(scene: &Scene, target: &Target) -> Option<String> {
     let color = |color: [f64; 3]| format!("color {}", color.map(number).join(" "));
+    let intensity = |intensity: f64, on: bool| {
+        format!("intensity {}{}", number(intensity), if on { "" } else { ", off" })
+    };
     let state = match target {
         Target::Camera => lens(&scene.camera),
         Target::Light(i) => {
             let light = scene.lights.get(*i)?;
-            let off = if light.on { "" } else { ", off" };
-            format!("intensity {}{off}", number(light.intensity))
+            intensity(light.intensity, light.on)
+        }
+        Target::Group(name) => {
+            let group = scene.groups.get(name)?;
+            intensity(group.intensity, group.on)
         }
         Target::Settings(SceneSettings::Ambient) => color(scene.ambient.color.0),
         Target::Settings(SceneSettings::Background) => color(scene.background.color.0),

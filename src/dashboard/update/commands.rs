@@ -143,6 +143,7 @@ pub static COMMANDS: &[Command] = &[
     command("light", "light brighter, fine", &[(Anywhere, "Alt-'")], |c| c.intensity(0.1)),
     command("light", "light darker, fine", &[(Anywhere, "Alt-;")], |c| c.intensity(-0.1)),
     command("light", "light on or off", &[(Anywhere, "L")], |c| c.switch_light()),
+    command("light", "light group alone, or all light", &[(Anywhere, "Alt-l")], |c| c.solo()).also("solo mute"),
     command("light", "add a light", &[(Anywhere, "A")], |c| c.pick_light()),
 
     command("mirror", "mirror rougher", &[(Anywhere, "]"), (Picture, ".")], |c| c.step_mirror("roughness", 1.0)).also("blur glossy").hints(&[hint(&[H::First, H::In(Picture)], 4, "[ ]", "roughness")]),

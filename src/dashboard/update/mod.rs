@@ -238,6 +238,7 @@ impl UpdateContext<'_> {
         model.last_edit = (coalesce == Coalesce::Repeat).then_some(self.now);
         if changed {
             self.show();
+            self.restart_reason().into_iter().for_each(|reason| self.say(reason));
         }
         changed
     }

@@ -44,7 +44,7 @@ impl UpdateContext<'_> {
         let name = match target {
             Target::Light(i) => scene.lights.get(*i).map(|light| light.name.clone()),
             Target::Object(i) => scene.objects.get(*i).map(|object| object.name.clone()),
-            Target::Material(name) | Target::View(name) => Some(name.clone()),
+            Target::Material(name) | Target::View(name) | Target::Group(name) => Some(name.clone()),
             Target::Part(..) => Some(label.clone()),
             Target::Camera | Target::Settings(_) => None,
         };

@@ -31,7 +31,11 @@ fn is_on(model: &Model, hit: &FirstHit, is_own_part: impl Fn(u32) -> bool) -> bo
         Target::Material(name) => {
             model.scene().objects.get(index).is_some_and(|object| object.names_material(name))
         }
-        Target::Camera | Target::View(_) | Target::Light(_) | Target::Settings(_) => false,
+        Target::Camera
+        | Target::View(_)
+        | Target::Group(_)
+        | Target::Light(_)
+        | Target::Settings(_) => false,
     }
 }
 

@@ -35,7 +35,7 @@ pub fn bounds(scene: &Scene, target: &Target) -> Option<BoundingSphere> {
             let used = scene.objects.iter().filter(|o| o.names_material(name));
             used.filter_map(|o| o.form().bounds()).reduce(union).map(ball)
         }
-        Target::Camera | Target::View(_) | Target::Settings(_) => None,
+        Target::Camera | Target::View(_) | Target::Group(_) | Target::Settings(_) => None,
     }
 }
 

@@ -70,7 +70,7 @@ pub(super) fn switch(
                 next.materials.get_mut(material).ok_or_else(|| EditError::gone(target))?;
             switch_texture(material, key, name);
         }
-        Target::Settings(_) => {}
+        Target::Group(_) | Target::Settings(_) => {}
     }
     let label = label(&next, target, key);
     Ok(Edit::checked(next, target.clone(), label)?.with_note(note))
@@ -340,7 +340,7 @@ mod tests {
         assert_eq!(spot.lights[0].falloff, Falloff::InverseSquare);
         let keys: Vec<_> = rows(&spot, &lamp).unwrap().into_iter().map(|r| r.key).collect();
         let expected = ["position", "direction", "outer_angle", "inner_angle"];
-        assert_eq!(keys[2..6], expected.map(|key| format!("spot.{key}")), "{keys:?}");
+        assert_eq!(keys[3..7], expected.map(|key| format!("spot.{key}")), "{keys:?}");
         let edit = set(&spot, &lamp, "spot.outer_angle", "40").unwrap();
         let LightKind::Spot(wide) = &edit.scene.lights[0].kind else { panic!() };
         assert_eq!(wide.outer_angle, 40.0);

@@ -92,10 +92,13 @@ fn add_copy(scene: &mut Scene, target: &Target) -> Result<Target, EditError> {
         Target::Camera | Target::Settings(_) => {
             return Err(EditError::new(format!("there is only one {}", target.label(scene)), ""));
         }
+        Target::Group(_) => {
+            return Err(EditError::new("a light group cannot be copied", "Copy its lights."));
+        }
     })
 }
 
-/// Deletes an object, a part, a light, a stored camera or a material. Objects whose material is deleted get
+/// Deletes an object, a part, a light, a light group, a stored camera or a material. Objects whose material is deleted get
 /// the default material, parts of compounds get that of the whole; the note names these objects.
 /// Fails for targets that every scene has.
 pub fn delete(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
@@ -121,6 +124,10 @@ pub fn delete(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
             next.cameras.remove(name);
             following(next.cameras.keys(), name).map(Target::View)
         }
+        Target::Group(name) => {
+            regroup(&mut next, name, "");
+            following(next.groups.keys(), name).map(Target::Group)
+        }
         Target::Material(name) => {
             next.materials.remove(name);
             note = strip(&mut next, name);
@@ -137,6 +144,17 @@ pub fn delete(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
 /// Returns the name to select once `gone` is deleted: the next of the sorted `names`, or the last.
 fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) -> Option<String> {
     names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
+}
+
+/// Renames a light group, with its lights and materials. With an empty name, they have groups of their
+/// own.
+fn regroup(scene: &mut Scene, old: &str, new: &str) {
+    let mix = scene.groups.remove(old).filter(|_| !new.is_empty());
+    scene.groups.extend(mix.map(|mix| (new.to_string(), mix)));
+    let of_lights = scene.lights.iter_mut().map(|light| &mut light.group);
+    let named = of_lights.chain(scene.materials.values_mut().map(|material| &mut material.group));
+    let named = named.chain([&mut scene.film.solo]);
+    named.filter(|group| *group == old).for_each(|group| *group = new.to_string());
 }
 
 /// Removes the material `name` from all objects and parts. Returns a note that names them; `None`
@@ -185,7 +203,9 @@ pub fn rename(scene: &Scene, target: &Target, new: &str) -> Result<Edit, EditErr
             next.lights[*i].name = new.clone();
             target.clone()
         }
-        Target::Material(_) | Target::View(_) if new.is_empty() => return Err(needed()),
+        Target::Material(_) | Target::View(_) | Target::Group(_) if new.is_empty() => {
+            return Err(needed());
+        }
         Target::Material(old) => {
             if old != &new && next.materials.contains_key(&new) {
                 return Err(taken("material"));
@@ -194,6 +214,13 @@ pub fn rename(scene: &Scene, target: &Target, new: &str) -> Result<Edit, EditErr
             next.materials.extend(moved.map(|material| (new.clone(), material)));
             next.objects.iter_mut().for_each(|object| object.rename_material(old, &new));
             Target::Material(new.clone())
+        }
+        Target::Group(old) => {
+            if old != &new && next.groups.contains_key(&new) {
+                return Err(taken("group"));
+            }
+            regroup(&mut next, old, &new);
+            Target::Group(new.clone())
         }
         Target::View(old) => {
             if old != &new && next.cameras.contains_key(&new) {

@@ -96,6 +96,7 @@ impl EditError {
     fn gone(target: &Target) -> Self {
         let what = match target {
             Target::View(name) => format!("there is no camera \"{}\"", truncated(name)),
+            Target::Group(name) => format!("there is no group \"{}\"", truncated(name)),
             Target::Material(name) => format!("there is no material \"{}\"", truncated(name)),
             Target::Light(i) => format!("there is no light {}", i + 1),
             Target::Object(i) => format!("there is no object {}", i + 1),

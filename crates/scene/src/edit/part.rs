@@ -25,7 +25,7 @@ pub(super) fn exclusive_keys(target: &Target) -> &'static [&'static str] {
         Target::Camera | Target::View(_) => &["target", "direction"],
         Target::Light(_) => LightKind::KEYS,
         Target::Material(_) => &["f0", "metal"],
-        Target::Object(_) | Target::Part(..) | Target::Settings(_) => &[],
+        Target::Object(_) | Target::Part(..) | Target::Group(_) | Target::Settings(_) => &[],
     }
 }
 

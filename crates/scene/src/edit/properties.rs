@@ -84,7 +84,11 @@ pub fn rows(scene: &Scene, target: &Target) -> Result<Vec<Property>, EditError> 
     let virtual_kind = match target {
         Target::Light(_) => Some(&KIND),
         Target::Camera | Target::View(_) => Some(&AIM),
-        Target::Object(_) | Target::Part(..) | Target::Material(_) | Target::Settings(_) => None,
+        Target::Object(_)
+        | Target::Part(..)
+        | Target::Group(_)
+        | Target::Material(_)
+        | Target::Settings(_) => None,
     };
     let given = given_key(part, target);
     let hidden_key =
@@ -332,7 +336,7 @@ mod tests {
                 "focus"
             ]
         );
-        assert_eq!(keys(&Target::Light(0))[..3], ["name", "kind", "point.position"]);
+        assert_eq!(keys(&Target::Light(0))[..4], ["name", "group", "kind", "point.position"]);
         let radius = row(&scene, &Target::Object(2), "shape.sphere.radius");
         assert_eq!((radius.value.as_str(), radius.components.len()), ("0.5", 1));
         assert_eq!((radius.unit, radius.depth, radius.is_default), ("scene units", 1, false));

@@ -43,7 +43,11 @@ pub fn rotate(scene: &Scene, target: &Target, degrees: f64) -> Result<Edit, Edit
                 *position = [coordinate(0), position[1], coordinate(2)];
             }
         }
-        Target::Camera | Target::View(_) | Target::Material(_) | Target::Settings(_) => {
+        Target::Camera
+        | Target::View(_)
+        | Target::Group(_)
+        | Target::Material(_)
+        | Target::Settings(_) => {
             let found = format!("{} cannot be rotated", target.label(scene));
             return Err(EditError::new(found, "Select an object or a light."));
         }

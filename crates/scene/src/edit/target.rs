@@ -14,6 +14,8 @@ pub enum Target {
     Camera,
     /// Stored camera, by its name.
     View(String),
+    /// Light group, by its name.
+    Group(String),
     /// Light, by its index.
     Light(usize),
     /// Object, by its index.
@@ -68,6 +70,7 @@ pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     list.extend(scene.cameras.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
     list.push((Section::Surroundings, Target::Settings(SceneSettings::Ambient)));
     list.push((Section::Surroundings, Target::Settings(SceneSettings::Background)));
+    list.extend(scene.groups.keys().map(|name| (Section::Lights, Target::Group(name.clone()))));
     list.extend((0..scene.lights.len()).map(|i| (Section::Lights, Target::Light(i))));
     (0..scene.objects.len()).for_each(|i| add_tree(scene, Target::Object(i), &mut list));
     let materials = scene.materials.keys();
@@ -112,6 +115,7 @@ impl Target {
             Self::Settings(SceneSettings::Integrator) => &["trace"],
             Self::View(name) => &["cameras", name],
             Self::Material(name) => &["materials", name],
+            Self::Group(name) => &["groups", name],
             Self::Light(i) => &["light", &i.to_string()],
             Self::Object(i) | Self::Part(i, _) => &["object", &i.to_string()],
         };
@@ -123,7 +127,7 @@ impl Target {
     pub fn label(&self, scene: &Scene) -> String {
         let named = |name: Option<&String>| name.filter(|n| !n.is_empty()).map(|n| truncated(n));
         match self {
-            Self::View(name) | Self::Material(name) => truncated(name),
+            Self::View(name) | Self::Material(name) | Self::Group(name) => truncated(name),
             Self::Light(i) => named(scene.lights.get(*i).map(|l| &l.name))
                 .unwrap_or_else(|| format!("light {}", i + 1)),
             Self::Object(i) => {
@@ -151,6 +155,26 @@ impl Target {
         }
     }
 
+    /// Returns the name of the light group of the light, emissive material or surroundings; `None`
+    /// for other targets.
+    pub fn light_group(&self, scene: &Scene) -> Option<String> {
+        let named =
+            |group: &String, own: String| if group.is_empty() { own } else { group.clone() };
+        match self {
+            Self::Group(name) => Some(name.clone()),
+            Self::Light(i) => Some(named(&scene.lights.get(*i)?.group, self.label(scene))),
+            Self::Settings(SceneSettings::Ambient | SceneSettings::Background) => {
+                Some(self.label(scene))
+            }
+            Self::Object(_) | Self::Part(..) | Self::Material(_) => {
+                let Self::Material(name) = self.material(scene)? else { return None };
+                let material = scene.materials.get(&name).filter(|material| material.emits())?;
+                Some(named(&material.group, name))
+            }
+            Self::Camera | Self::View(_) | Self::Settings(_) => None,
+        }
+    }
+
     /// Returns this target if it is a material, or the material of this object or part. Returns `None`
     /// for other targets, and if the scene does not have the material.
     pub fn material(&self, scene: &Scene) -> Option<Self> {
@@ -161,7 +185,9 @@ impl Target {
                 "" => return self.compound()?.material(scene),
                 name => name,
             },
-            Self::Camera | Self::View(_) | Self::Light(_) | Self::Settings(_) => return None,
+            Self::Camera | Self::View(_) | Self::Group(_) | Self::Light(_) | Self::Settings(_) => {
+                return None;
+            }
         };
         scene.materials.contains_key(name).then(|| Self::Material(name.to_string()))
     }

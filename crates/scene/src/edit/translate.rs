@@ -33,7 +33,7 @@ pub fn move_by(scene: &Scene, target: &Target, by: [f64; 3]) -> Result<Edit, Edi
             let view = next.cameras.get_mut(name).ok_or_else(|| EditError::gone(target))?;
             move_camera(view, by);
         }
-        Target::Material(_) | Target::Settings(_) => {
+        Target::Group(_) | Target::Material(_) | Target::Settings(_) => {
             let found = format!("{} cannot be moved", target.label(scene));
             return Err(EditError::new(found, "Select an object, a light or the camera."));
         }

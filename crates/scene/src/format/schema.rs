@@ -38,6 +38,12 @@ pub const FIELDS: &[Field] = &[
     ),
     table("background", Background::FIELDS, "Radiance of rays that hit no surface."),
     table("ambient", Ambient::FIELDS, "Ambient light: uniform, without shadows."),
+    optional(
+        "groups",
+        ValueType::Named(light::LightGroup::FIELDS),
+        "there are none",
+        "Mixes of light groups by name, for the key `group` of lights and materials.",
+    ),
     optional("light", ValueType::Tables(|| light::FIELDS), "there are none", "The lights."),
     optional(
         "materials",
@@ -119,7 +125,7 @@ impl SchemaReader<'_> {
     /// `object.3.shape.sphere`.
     fn inner(&self) -> String {
         let above = match self.path.first().map(String::as_str) {
-            Some("object" | "light" | "materials" | "cameras") => 2,
+            Some("object" | "light" | "materials" | "cameras" | "groups") => 2,
             _ => 1,
         };
         phrase(self.path.get(above..).unwrap_or_default())

@@ -11,6 +11,7 @@ mod emitter;
 mod emitter_table;
 mod environment;
 mod form;
+mod group;
 mod point;
 mod rectangle;
 mod registry;
@@ -28,6 +29,7 @@ pub use emitter::Emitter;
 pub use emitter_table::{EmitterTable, lanes_with};
 pub use environment::{Environment, EnvironmentLight};
 pub use form::{EmissiveSurface, LightForm};
+pub use group::LightGroup;
 pub use point::Point;
 pub use rectangle::RectangleLight;
 pub use registry::{Handles, LightDesc, LightKind, Placement};
@@ -43,6 +45,8 @@ description! {
     pub struct Light {
         /// Name of the light; every light has a different one.
         name: String, or "a number";
+        /// Light group in which the light is mixed with others, which keep their proportions.
+        group: String, or "a group of its own";
         /// Colour, by which the intensity is multiplied.
         color: Color = [1.0, 1.0, 1.0], in LIGHT;
         /// Sphere, rectangle or disk: radiance or power, as `unit` says. Environment: factor
@@ -59,7 +63,7 @@ description! {
         visible: bool = true;
         /// `false` switches the light off.
         on: bool = true;
-        flatten kind: LightKind, after 1;
+        flatten kind: LightKind, after 2;
     }
 }
 

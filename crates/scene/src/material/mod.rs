@@ -83,6 +83,8 @@ description! {
         emission: f64 = 0.0, in LIGHT "W/(sr m²)";
         /// Colour of the emitted light; multiplies `emission`.
         emission_color: Color = [1.0, 1.0, 1.0], in LIGHT;
+        /// Light group in which the emission is mixed with other lights.
+        group: String, or "a group of its own";
         /// `true`: the back of a surface has the same material as its front. `false`: the back is
         /// black. Only its `transmission` remains, and total internal reflection unless `fresnel`
         /// is `dielectric`.
@@ -321,7 +323,7 @@ mod tests {
             "emission_color",
         ];
         assert_eq!(keys, numbers);
-        assert_eq!(FIELDS.len(), numbers.len() + 9, "check the range of the new field here");
+        assert_eq!(FIELDS.len(), numbers.len() + 10, "check the range of the new field here");
         bad = Material { metal: Some(Metal::Gold), ..Material::default() };
         assert!(bad.faults().is_empty());
         bad.f0 = Some(Color::WHITE);

@@ -48,12 +48,17 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
         !lights.delta_lights.is_empty() || lights.choice.is_some() || lights.has_emitters();
     let nested_dielectrics = world.nested_dielectrics.as_ref();
     let passes = nested_dielectrics.is_some_and(|nested| nested.clear_panes.is_some());
-    let is_shared = |source: &LightGroupSource| matches!(source, LightGroupSource::Shared(_));
+    let shared = |is_named: bool| {
+        let is_shared = |group: &&LightGroupSource| matches!(group, LightGroupSource::Shared(name, _) if name.is_empty() != is_named);
+        groups.iter().filter(is_shared).count()
+    };
+    parts.extend(counted(shared(true), "named light group"));
     parts.extend(present([
-        (groups.iter().any(is_shared), "shared light group"),
+        (shared(false) > 0, "shared light group"),
         (groups.contains(&LightGroupSource::Ambient), "ambient"),
         (groups.contains(&LightGroupSource::Background), "background"),
         (passes && has_lights, "shadow rays through clear panes"),
+        (!world.mirrors.is_empty(), "mirror light"),
         (ray_types == RayTypes::Primary, "no shadows"),
         (ray_types == RayTypes::Shadows && has_lights, "shadows only"),
         (scene.film.filter == Filter::Point, "no anti-aliasing"),

@@ -3,14 +3,15 @@
 use crate::lights::groups::{LightGroupSource, LightGroups, contributes};
 use zerkalo_scene::light::Light;
 use zerkalo_scene::material::Material;
-use zerkalo_scene::value::Color;
+use zerkalo_scene::value::{Color, truncated};
 use zerkalo_scene::{Object, Scene};
 
 impl LightGroups {
     /// Returns `true` if the samples of the scene `compiled` are valid for `scene`, so that only
     /// the weights of the light groups have to change. `self` are the light groups of `compiled`.
     /// The scenes may differ in names, in unused materials, in the largest number of samples per
-    /// pixel of glossy tiles, and in the emission of sources that have a group of their own.
+    /// pixel of glossy tiles, in the mixes of light groups, and in the emission of sources that have a
+    /// group of their own.
     pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
         let has_background = compiled.background.color != Color::BLACK;
         let has_ambient = !self.ambient || self.members.contains(&LightGroupSource::Ambient);
@@ -35,12 +36,32 @@ impl LightGroups {
         };
         let mut emitting =
             scene.lights.iter().enumerate().filter(|(_, light)| contributes(light, self.lit));
-        let same_emission_if_shared = |source: &LightGroupSource| {
-            let LightGroupSource::Shared(list) = source else { return true };
-            list.iter().all(|source| source.emission(scene) == source.emission(compiled))
-        };
         emitting.all(|(i, light)| is_compiled(i) && same_but_emission(i, light))
-            && self.members.iter().all(same_emission_if_shared)
+            && self.changed_in_shared(compiled, scene).is_none()
+    }
+
+    /// Returns a light group whose proportions differ between `compiled` and `scene`.
+    fn changed_in_shared(&self, compiled: &Scene, scene: &Scene) -> Option<&LightGroupSource> {
+        self.members.iter().filter(|group| group.is_shared()).find(|group| {
+            let differs = |source| group.traced(source, scene) != group.traced(source, compiled);
+            group.emitting().iter().any(differs)
+        })
+    }
+
+    /// Returns why a change of lights from `compiled` to `scene` needs new samples, if a light group
+    /// with several lights is the reason.
+    pub fn restart_reason(&self, compiled: &Scene, scene: &Scene) -> Option<String> {
+        let group = self.changed_in_shared(compiled, scene)?;
+        let lights = group.emitting().len();
+        Some(match group.name(scene) {
+            "" => {
+                format!("The film has no room to keep these {lights} lights apart: it starts again")
+            }
+            name => format!(
+                "The {lights} lights of {} share their samples, which start again · the group mixes at once",
+                truncated(name)
+            ),
+        })
     }
 
     /// Returns `true` if the material `name_a` of the scene `compiled` and the material `name_b` of
@@ -71,6 +92,7 @@ fn fixed_parts(scene: &Scene) -> Scene {
     let Scene { film, trace, camera, background, ambient, objects, .. } = scene.clone();
     let mut fixed = Scene { film, trace, camera, background, ambient, objects, ..Scene::default() };
     (fixed.film.rays_per_pixel, fixed.film.tone) = (0, zerkalo_scene::Tone::Clip);
+    fixed.film.solo.clear();
     (fixed.background.color, fixed.ambient.color) = (Color::BLACK, Color::BLACK);
     for object in &mut fixed.objects {
         let names = [&mut object.name, &mut object.material];

@@ -241,11 +241,13 @@ pub fn left_out(scene: &Scene) -> Vec<&'static str> {
     let diffuse = scene.objects.iter().any(is_diffuse);
     let full = trace.ray_types == RayTypes::Full;
     let bounces = full && trace.max_diffuse_depth > 0;
+    let no_caustics = diffuse && specular && !(bounces && trace.caustics);
     let names = [
         (trace.ray_types == RayTypes::Primary, "no shadows"),
         (specular && (!full || trace.max_depth == 0), "no reflections"),
         (diffuse && !bounces, "no bounces"),
-        (diffuse && specular && !(bounces && trace.caustics), "no caustics"),
+        (no_caustics && !trace.mirror_light, "no caustics"),
+        (no_caustics && trace.mirror_light, "caustics of single flat mirrors alone"),
     ];
     names.into_iter().filter(|(missing, _)| *missing).map(|(_, name)| name).collect()
 }

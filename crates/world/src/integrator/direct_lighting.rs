@@ -6,6 +6,7 @@ use crate::integrator::clear_panes::Shadow;
 use crate::integrator::nested_dielectrics::attenuated;
 use crate::integrator::vertex::Vertex;
 use crate::lights::choice::LightChoice;
+use crate::world::LaneGroups;
 use std::f64::consts::FRAC_1_PI;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
@@ -19,14 +20,14 @@ pub(crate) fn cosine_pdf<L: SimdFloat>(cos: L) -> L {
 }
 
 impl<L: SimdFloat> Vertex<'_, L> {
-    /// Adds an estimate of the light of one light sample to a light group (`SampleLd` of pbrt).
+    /// Adds an estimate of the light of one light sample to its light groups (`SampleLd` of pbrt).
     /// `lit` are the lanes that the light reaches if nothing occludes it. `occluded` traces shadow
     /// rays for the given lanes. `radiance` returns the radiance
     /// that surfaces reflect or transmit.
     #[inline(always)]
     pub fn add_light(
         &mut self,
-        group: usize,
+        groups: LaneGroups<L>,
         mut lit: L::Mask,
         shadow: impl FnOnce(&Self, L::Mask) -> Shadow<L>,
         radiance: impl FnOnce(&Self, L::Mask) -> Vec3<L>,
@@ -47,7 +48,16 @@ impl<L: SimdFloat> Vertex<'_, L> {
         if let Some(passed) = passed {
             radiance = radiance * passed;
         }
-        self.out.groups[group] += radiance;
+        match groups {
+            LaneGroups::All(group) => self.out.groups[group] += radiance,
+            LaneGroups::Each(numbers) => {
+                for group in 0..self.world.info.scales.len() {
+                    let number = L::from_f64(group as f64);
+                    let own = numbers.ge(number) & numbers.le(number);
+                    self.out.groups[group] += radiance.masked(own);
+                }
+            }
+        }
     }
 
     /// Returns the radiance that `light`, of unit emission, adds to the samples if nothing occludes
@@ -60,7 +70,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
 
     /// Returns the lanes with a diffuse part or highlights that face the light from `wi`.
     #[inline(always)]
-    fn facing<const SIMPLE: bool>(&self, wi: Vec3<L>) -> L::Mask {
+    pub fn facing<const SIMPLE: bool>(&self, wi: Vec3<L>) -> L::Mask {
         let interaction = self.interaction;
         let mut facing = interaction.direct_mask & interaction.normal.dot(wi).gt(L::zero());
         if !SIMPLE && self.world.smooth {
@@ -139,7 +149,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 lit = lit & light.irradiance.x.gt(L::zero());
             }
             self.add_light(
-                source.group,
+                LaneGroups::All(source.group),
                 lit,
                 #[inline(always)]
                 |vertex, lit| {
@@ -201,7 +211,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 };
                 vertex.shadow(occluded, &ray, distance, vertex.media)
             };
-            self.add_light(choice.group, lit, shadow, |vertex, lit| {
+            self.add_light(lights.groups(stratum), lit, shadow, |vertex, lit| {
                 let diffuse = cosine_pdf(interaction.normal.dot(wi));
                 let value = vertex.direct_value(wi, diffuse, lit);
                 let mut radiance = vertex.path.throughput.component_mul(value);

@@ -18,7 +18,7 @@ use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
 use crate::lights::emitter_choice::{Cells, MAX_WAYS};
 use crate::lights::emitters::{EmissiveSource, Emitters, Sampled};
-use crate::world::{LightSource, World};
+use crate::world::{LaneGroups, LightSource, World};
 use zerkalo_kernel::bvh::{Hit, Ray};
 use zerkalo_kernel::lanes::{MAX_WIDTH, Mask, SimdFloat, Vec3, distinct};
 use zerkalo_kernel::primitive::PrimitiveSet;
@@ -253,8 +253,12 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let arrives = arrives & self.arrives(light.wi);
         let value = self.reflected(light, arrives, rays, |_| L::one());
         let lit = value.max_element().gt(L::zero());
+        let groups = match sampled {
+            Sampled::One(_) => LaneGroups::All(source.group),
+            Sampled::Each(numbers) => world.lights.emitters.groups(numbers),
+        };
         self.add_light(
-            source.group,
+            groups,
             lit,
             #[inline(always)]
             |vertex, lit| {

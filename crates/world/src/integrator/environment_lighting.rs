@@ -11,11 +11,11 @@
 
 use crate::integrator::direct_lighting::cosine_pdf;
 use crate::integrator::emitter_lighting::{ReflectedRays, power_heuristic};
-use crate::integrator::indirect_diffuse::NO_PDF;
+use crate::integrator::indirect_diffuse::{NO_PDF, THROWN_PDF};
 use crate::integrator::nested_dielectrics::{Media, attenuated};
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
-use crate::world::{EnvironmentSource, LightSource, World};
+use crate::world::{EnvironmentSource, LaneGroups, LightSource, World};
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Frame, Mask, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp;
@@ -40,7 +40,9 @@ pub(crate) fn visible_environments<L: SimdFloat>(
     }
     for source in world.lights.environments.iter().filter(|source| source.visible) {
         let (radiance, pdf) = source.light.radiance(path.ray.direction, lanes);
-        let weight = power_heuristic(path.lobe_pdf, pdf);
+        // No environment is sampled through a mirror.
+        let is_sampled = path.lobe_pdf.gt(L::from_f64(THROWN_PDF));
+        let weight = L::select(is_sampled, power_heuristic(path.lobe_pdf, pdf), L::one());
         let radiance = path.throughput.component_mul(radiance) * weight;
         let radiance = attenuated(media, radiance, L::from_f64(L::MAX));
         out.groups[source.group] += source.emitted(radiance).masked(lanes);
@@ -119,7 +121,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             vertex.shadow(occluded, &ray, t_max, vertex.media)
         };
         let lit = value.max_element().gt(L::zero());
-        self.add_light(environment.group, lit, shadow, |vertex, _| {
+        self.add_light(LaneGroups::All(environment.group), lit, shadow, |vertex, _| {
             environment.emitted(vertex.path.throughput.component_mul(value))
         });
     }

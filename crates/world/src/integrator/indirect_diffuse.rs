@@ -30,6 +30,10 @@ use zerkalo_kernel::sampling::warp::cosine_hemisphere;
 /// environments.
 pub(crate) const NO_PDF: f64 = 1e-30;
 
+/// Density [1/sr] of such rays after a reflection at a mirror that throws light. They find no sampled
+/// emitters.
+pub(crate) const THROWN_PDF: f64 = 1e-29;
+
 /// Limits of indirect diffuse light in a scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DiffuseLimits {

@@ -12,7 +12,7 @@ use crate::integrator::emitter_lighting::power_heuristic;
 use crate::integrator::nested_dielectrics::{InterfaceHit, Media, NestedDielectrics, attenuated};
 use crate::integrator::vertex::Vertex;
 use crate::lights::emitters::Sampled;
-use crate::world::LightSource;
+use crate::world::{LaneGroups, LightSource};
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 use zerkalo_scene::light::LightSample;
@@ -182,7 +182,11 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 None => vertex.shadow(occluded, &ray, t_max, media),
             }
         };
-        self.add_light(source.group, lit, shadow, |vertex, _| {
+        let groups = match emitters {
+            Some(Sampled::Each(numbers)) => world.lights.emitters.groups(numbers),
+            Some(Sampled::One(_)) | None => LaneGroups::All(source.group),
+        };
+        self.add_light(groups, lit, shadow, |vertex, _| {
             let radiance = vertex.path.throughput.component_mul(value);
             source.emitted(attenuated(Some(side.media), radiance, light.distance))
         });

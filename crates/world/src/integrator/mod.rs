@@ -13,6 +13,7 @@ pub(crate) mod first_hit;
 pub(crate) mod indirect_diffuse;
 mod interaction;
 mod interface_lighting;
+pub(crate) mod mirror_light;
 pub(crate) mod nested_dielectrics;
 mod opaque;
 pub(crate) mod path;

@@ -68,6 +68,9 @@ impl<L: SimdFloat> Vertex<'_, L> {
         if let Some(choice) = &world.lights.choice {
             self.chosen_lights::<SIMPLE>(choice);
         }
+        if !SIMPLE && !world.mirrors.is_empty() && self.interaction.direct_mask.any() {
+            self.mirror_light();
+        }
         if emitters {
             let rays = rays(self);
             self.emitter_lighting(&rays);
@@ -93,6 +96,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             }
             if !SIMPLE && world.lights.has_emitters() {
                 let pdf = eval_lobe(world, interaction, &query, index, direction).density;
+                let pdf = world.thrown(interaction.primitive, path.lobe_pdf, pdf);
                 path.lobe_pdf = L::select(lanes, pdf, path.lobe_pdf);
             }
             path.ray.direction = Vec3::select(lanes, direction, path.ray.direction);

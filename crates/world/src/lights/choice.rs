@@ -12,10 +12,11 @@
 //!
 //! The probabilities depend neither on the intensities of the lights nor on the surface point.
 //! Lights that are much brighter than the others are left out of the choice: shadow rays go to them
-//! from every surface. All lights are in one light group, see [`LightGroups`](crate::LightGroups).
+//! from every surface. The lights may be in several light groups, among which the choice makes no
+//! difference.
 
 use crate::lights::emitter_choice::MIN_EMITTERS;
-use crate::world::DeltaSource;
+use crate::world::{DeltaSource, LaneGroups};
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo_kernel::bvh::morton_code;
@@ -61,6 +62,7 @@ struct Stratum<S> {
     /// Irradiance at normal incidence, the same at every distance; 0 for lights whose irradiance
     /// decreases with the square of the distance.
     constant: Table<S>,
+    groups: Table<S>,
     /// Red, green and blue emission; 1 in sets without a light of the stratum.
     emission: [Table<S>; 3],
     /// Cones of the lights; `None` if all lights emit equally in all directions.
@@ -77,8 +79,6 @@ struct Cones<S> {
 
 /// Point and spot lights of a scene, of which each path chooses a few at each surface.
 pub(crate) struct LightChoice<S> {
-    /// Light group of all lights of this choice.
-    pub group: usize,
     /// Number of sets, a power of two. This many successive samples of a pixel together trace a
     /// shadow ray to each light once.
     pub sets: usize,
@@ -134,10 +134,8 @@ impl<S: Float> LightChoice<S> {
         let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
         let morton = |source: &_| morton_code(((place(source) - low) / extent).to_array());
         sort_by_number(&mut chosen, |source| morton(source) as i64);
-        let group = chosen[0].group;
-        assert!(chosen.iter().all(|light| light.group == group), "many point lights share a group");
         let strata = chosen.chunks(sets).map(|lights| Stratum::new(lights, sets)).collect();
-        Some(Self { group, sets, strata })
+        Some(Self { sets, strata })
     }
 
     /// Returns a sphere around the lights of each stratum.
@@ -160,7 +158,8 @@ impl<S: Float> Table<S> {
     /// without a light of the stratum.
     fn new(values: impl Iterator<Item = S>, absent: f64, sets: usize) -> Self {
         let mut values: Vec<S> = values.collect();
-        if values.len() == sets && values.iter().all(|value| *value == values[0]) {
+        let fills = values.len() == sets || values[0] == S::from_f64(absent);
+        if fills && values.iter().all(|value| *value == values[0]) {
             return Self::Common(values[0]);
         }
         values.resize(sets.max(MIN_TABLE), S::from_f64(absent));
@@ -210,6 +209,7 @@ impl<S: Float> Stratum<S> {
             ball: BoundingSphere::around(&lights.iter().map(place).collect::<Vec<_>>()),
             positions: [0, 1, 2].map(|axis| table(f64::NAN, &|light| coordinate(light, axis))),
             constant: table(0.0, &constant),
+            groups: table(lights[0].group as f64, &|light| S::from_f64(light.group as f64)),
             emission: [0, 1, 2].map(|channel| table(1.0, &|light| emission(light, channel))),
             cones,
         }
@@ -250,6 +250,15 @@ impl<S: Float> ChosenSets<'_, S> {
         let Cones { axis, outer, scale } = self.choice.strata[stratum].cones.as_ref()?;
         let (outer, scale) = (outer.gather(&self.sets), scale.gather(&self.sets));
         Some(spot_factor(wi, self.gather(axis), outer, scale))
+    }
+
+    /// Returns the light group of each lane's light.
+    #[inline(always)]
+    pub fn groups<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> LaneGroups<L> {
+        match &self.choice.strata[stratum].groups {
+            Table::Common(group) => LaneGroups::All(group.to_f64() as usize),
+            table @ Table::BySet(_) => LaneGroups::Each(table.gather(&self.sets)),
+        }
     }
 
     /// Returns the emission of each lane's light; 1 if the tracer does not multiply samples by it.

@@ -1,6 +1,6 @@
 //! Choice of emitters by importance, in scenes with many of them.
 //!
-//! Emitters of one light group form a binary tree: consecutive ones in the order of a Morton curve.
+//! Emitters of one light group, and those of all groups with several lights, form a binary tree: consecutive ones in the order of a Morton curve.
 //! The scene is divided into cells. Each cell has a list of *clusters*, which are subtrees that
 //! together contain every emitter once, and a table of *slots*, whose number is a power of two. A
 //! cluster has slots in proportion to its importance for the cell: its power, its distance, and the
@@ -12,8 +12,8 @@
 //! emitters and their surfaces. A path chooses at each surface once from each of several equal
 //! parts (*ways*) of the slots.
 //!
-//! Powers are compared within a light group only, and every group is chosen from by itself.
-//! Probabilities therefore do not depend on light weights.
+//! Powers are those of the lights without the light weights of their groups. Probabilities therefore
+//! do not depend on light weights.
 
 use glam::DVec3;
 use std::collections::BinaryHeap;
@@ -26,10 +26,10 @@ use zerkalo_scene::value::sort_by_number;
 /// Smallest number of emitters in a scene for which paths choose.
 pub(crate) const MIN_EMITTERS: usize = 16;
 
-/// Largest number of choices at a surface from the emitters of a light group.
+/// Largest number of choices at a surface from the emitters of a tree.
 pub(crate) const MAX_WAYS: usize = 2;
 
-/// Largest number of emitters of a light group that are all asked where a highlight or a reflection
+/// Largest number of emitters of a tree that are all asked where a highlight or a reflection
 /// may show any one of them.
 const MAX_ASKED: usize = 128;
 
@@ -57,7 +57,7 @@ pub(crate) struct EmitterBounds {
     pub ball: BoundingSphere,
     /// Normal of the only side that emits light; `None` if light goes into all directions.
     pub normal: Option<DVec3>,
-    /// Power relative to the emitters of its light group; greater than 0 and finite.
+    /// Power relative to the emitters of its tree; greater than 0 and finite.
     pub power: f64,
 }
 
@@ -104,7 +104,7 @@ struct Grid<S> {
     size: [u32; 3],
 }
 
-/// Emitters of a light group, of which paths choose a few at each surface.
+/// Emitters of a tree, of which paths choose a few at each surface.
 #[derive(Debug)]
 pub(crate) struct EmitterChoice<S> {
     grid: Grid<S>,

@@ -15,7 +15,7 @@ use crate::integrator::coincident_surfaces::{first_primitives, touching_pairs};
 use crate::lights::emissive_forms::surface_of;
 use crate::lights::emitter_choice::{Cells, EmitterBounds, EmitterChoice, MIN_EMITTERS};
 use crate::lights::groups::{GroupedSource, LightGroupSource, LightGroups};
-use crate::world::LightSource;
+use crate::world::{LaneGroups, LightSource};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use zerkalo_kernel::bvh::Ray;
@@ -52,6 +52,8 @@ pub(crate) struct Emitters<S> {
     lift: S,
     /// Choices that together have every emitter whose points are sampled, if there are many.
     pub choices: Vec<EmitterChoice<S>>,
+    /// `true` if some choice has emitters of several light groups.
+    mixed: bool,
     /// For each of these emitters, its choice and its place there.
     place_of: Vec<(u32, u32)>,
     table: EmitterTable<S>,
@@ -141,19 +143,21 @@ impl<S: Float> Emitters<S> {
             ..Self::default()
         };
         match sampled >= MIN_EMITTERS {
-            true => emitters.with_choices(forms),
+            true => emitters.with_choices(forms, groups),
             false => emitters,
         }
     }
 
-    /// Adds the choices among emitters: one for each light group and one for each distant light.
-    fn with_choices(mut self, forms: &[Form]) -> Self {
+    /// Adds the choices among emitters: one for all that share their light groups, one for each other
+    /// group, and one for each distant light.
+    fn with_choices(mut self, forms: &[Form], groups: &LightGroups) -> Self {
+        let is_shared = |source: &EmissiveSource<S>| groups.members[source.group].is_shared();
         let emission = |i: usize| {
             self.sources[i]
                 .emission
                 .map_or(1.0, |e| e.map(S::to_f64).into_iter().fold(0.0, f64::max))
         };
-        let mut groups: BTreeMap<(usize, usize), Vec<(u32, EmitterBounds)>> = BTreeMap::new();
+        let mut choices: BTreeMap<(usize, usize), Vec<(u32, EmitterBounds)>> = BTreeMap::new();
         let sampled = self.sources[..self.sampled].iter().enumerate();
         for (i, source) in sampled {
             let Some(light) = &source.light else { continue };
@@ -164,13 +168,14 @@ impl<S: Float> Emitters<S> {
             let shown = if normal.is_some() { 1.0 } else { 0.25 };
             let power = light.radiance.to_f64() * light.area.min(f64::MAX) * emission(i) * shown;
             let bounds = EmitterBounds { ball, normal, power };
-            groups.entry((source.group, distant)).or_default().push((i as u32, bounds));
+            let group = if is_shared(source) { usize::MAX } else { source.group };
+            choices.entry((group, distant)).or_default().push((i as u32, bounds));
         }
         let boxes = || forms.iter().filter_map(|form| form.bounds());
         let low = boxes().map(|b| b.0).reduce(DVec3::min).unwrap_or_default();
         let high = boxes().map(|b| b.1).reduce(DVec3::max).unwrap_or_default();
         self.place_of = vec![(0, 0); self.sampled];
-        for mut list in groups.into_values() {
+        for mut list in choices.into_values() {
             let largest = list.iter().map(|(_, bounds)| bounds.power).fold(0.0, f64::max);
             for (_, bounds) in &mut list {
                 // Relative to the largest, so that no sum overflows.
@@ -180,7 +185,10 @@ impl<S: Float> Emitters<S> {
             let sources = || choice.emitters().iter().map(|number| &self.sources[*number as usize]);
             let all_visible = sources().all(|source| source.visible);
             let colored = sources().any(|source| source.emission.is_some());
+            let group = self.sources[choice.emitters()[0] as usize].group;
+            let mixed = sources().any(|source| source.group != group);
             (choice.all_visible, choice.colored) = (all_visible, colored);
+            self.mixed |= mixed;
             for (emitter, place) in choice.emitters().iter().zip(0..) {
                 self.place_of[*emitter as usize] = (self.choices.len() as u32, place);
             }
@@ -231,6 +239,16 @@ impl<S: Float> Emitters<S> {
         let LightSource { group, .. } = self.sources[choice.emitters()[0] as usize];
         let source = LightSource { light, group, emission: None, visible: true };
         (source, chosen.emitters)
+    }
+
+    /// Returns the light groups of the emitters with these numbers, which are of one choice.
+    #[inline(always)]
+    pub fn groups<L: SimdFloat<Scalar = S>>(&self, numbers: &[u32; MAX_WIDTH]) -> LaneGroups<L> {
+        let group = |lane: usize| self.sources[numbers[lane] as usize].group;
+        match self.mixed {
+            true => LaneGroups::Each(L::from_fn(|lane| S::from_f64(group(lane) as f64))),
+            false => LaneGroups::All(group(0)),
+        }
     }
 
     /// Returns the factor of the density of emitter number `index` for receivers that choose: the

@@ -1,14 +1,16 @@
 //! Light groups. A *light group* is the part of the picture that comes from one source: a light, an
 //! emissive material, ambient light or the background. It is proportional to the *emission* of the
 //! source, its colour times its intensity. The film stores each group separately, so that emissions
-//! can change without new samples.
+//! can change without new samples. Several lights and materials share a group if the user has named
+//! it; the samples of each are multiplied by its own emission, and the light weight is the mix of the
+//! group.
 
 use crate::analysis::radiance_range::{RadianceRange, SceneDistances};
 use crate::lights::choice::ManyLights;
 use crate::world::LightSource;
 use std::collections::HashMap;
 use zerkalo_kernel::lanes::Float;
-use zerkalo_scene::light::Light;
+use zerkalo_scene::light::{Light, LightGroup};
 use zerkalo_scene::material::Material;
 use zerkalo_scene::value::Color;
 use zerkalo_scene::{Object, Scene};
@@ -38,8 +40,9 @@ pub enum LightGroupSource {
     Light(usize),
     /// Emission of all objects with the material of this name.
     Material(String),
-    /// Several lights and materials. The tracer multiplies the samples of each by its emission.
-    Shared(Vec<LightGroupSource>),
+    /// Lights and materials of a group of the user, by its name. The name is empty if the group holds
+    /// those for which the film has no room.
+    Shared(String, Vec<LightGroupSource>),
 }
 
 impl LightGroupSource {
@@ -48,19 +51,55 @@ impl LightGroupSource {
         match self {
             Self::Ambient | Self::Background => &[],
             Self::Light(_) | Self::Material(_) => std::slice::from_ref(self),
-            Self::Shared(list) => list,
+            Self::Shared(_, list) => list,
         }
     }
 
-    /// Returns the emission of the source, which is the light weight of its group in the picture of
-    /// `scene`; white for several lights and materials.
-    pub(crate) fn emission(&self, scene: &Scene) -> [f64; 3] {
+    /// Returns the light weight of the group in the picture of `scene`.
+    pub(crate) fn weight(&self, scene: &Scene) -> [f64; 3] {
+        match self {
+            Self::Shared(_, list) if list.len() == 1 => list[0].weight(scene),
+            Self::Shared(name, _) => mix(scene, name),
+            Self::Ambient | Self::Background | Self::Light(_) | Self::Material(_) => {
+                let (own, mix) = (self.emission(scene), mix(scene, self.name(scene)));
+                std::array::from_fn(|i| own[i] * mix[i])
+            }
+        }
+    }
+
+    /// Returns the factor of the samples of `source`, one of this group.
+    pub(crate) fn traced(&self, source: &Self, scene: &Scene) -> [f64; 3] {
+        match self {
+            Self::Shared(_, list) if list.len() == 1 => [1.0; 3],
+            Self::Shared(name, _) if name.is_empty() => source.weight(scene),
+            Self::Shared(..) => source.emission(scene),
+            Self::Ambient | Self::Background | Self::Light(_) | Self::Material(_) => [1.0; 3],
+        }
+    }
+
+    /// Returns `true` if the group has several lights and materials, whose proportions are fixed.
+    pub(crate) fn is_shared(&self) -> bool {
+        matches!(self, Self::Shared(_, list) if list.len() > 1)
+    }
+
+    /// Returns the name of the light group that the user has given to the source; may be empty.
+    pub(crate) fn name<'a>(&'a self, scene: &'a Scene) -> &'a str {
+        match self {
+            Self::Ambient | Self::Background => "",
+            Self::Light(i) => scene.lights.get(*i).map_or("", |light| &light.group),
+            Self::Material(name) => scene.materials.get(name).map_or("", |m| &m.group),
+            Self::Shared(name, _) => name,
+        }
+    }
+
+    /// Returns the emission of the source without the mix of its group.
+    fn emission(&self, scene: &Scene) -> [f64; 3] {
         match self {
             Self::Ambient => scene.ambient.color.0,
             Self::Background => scene.background.color.0,
             Self::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
             Self::Material(name) => scene.materials.get(name).map_or([0.0; 3], Material::emitted),
-            Self::Shared(_) => [1.0; 3],
+            Self::Shared(..) => [1.0; 3],
         }
     }
 }
@@ -71,7 +110,7 @@ pub(crate) struct GroupedSource<'a> {
     pub source: &'a LightGroupSource,
     /// Index of the light group.
     pub group: usize,
-    /// Emission by which the tracer multiplies the samples; 1 for a source with a group of its own.
+    /// Factor of the samples; 1 for a source with a group of its own.
     pub emission: [f64; 3],
 }
 
@@ -97,9 +136,9 @@ pub struct LightGroups {
 
 impl LightGroups {
     /// Creates the light groups of `scene`. Lights and emissive materials have groups of their own,
-    /// with three exceptions that share the last group: all of them if `merge_lights` is `true`,
-    /// the lights of a kind of which the scene has many (see `ManyLights`), and the lights and
-    /// materials beyond the largest number of groups.
+    /// or that which the user has given them, with three exceptions that share the last group: all of
+    /// them if `merge_lights` is `true`, the lights without a given group of a kind of which the scene
+    /// has many (see `ManyLights`), and the lights and materials beyond the largest number of groups.
     ///
     /// `lit` is `true` if some surface reflects direct light, and `ambient` if some surface
     /// reflects ambient light. A light that no surface reflects has a group only if the camera can
@@ -117,11 +156,25 @@ impl LightGroups {
         // Many point lights share one group: separate sums for seven of them would take a quarter
         // of the rendering time. The same holds for many spot lights.
         let many = ManyLights::new(emitting.iter().map(|i| &scene.lights[*i]));
-        let (shared, separate): (Vec<_>, Vec<_>) =
-            emitting.into_iter().partition(|i| many.includes(&scene.lights[*i]));
-        let [mut shared, mut separate] = [shared, separate]
-            .map(|lights| lights.into_iter().map(LightGroupSource::Light).collect::<Vec<_>>());
-        separate.extend(emissive_materials(scene).into_iter().map(LightGroupSource::Material));
+        let lights = emitting.into_iter().map(LightGroupSource::Light);
+        let materials = emissive_materials(scene).into_iter().map(LightGroupSource::Material);
+        let (mut shared, mut separate, mut own) = (Vec::new(), Vec::new(), Vec::new());
+        for source in lights.chain(materials) {
+            let name = source.name(scene);
+            let is_named =
+                |group: &&mut _| matches!(group, LightGroupSource::Shared(n, _) if n == name);
+            match (separate.iter_mut().find(is_named), &source) {
+                (Some(LightGroupSource::Shared(_, list)), _) => list.push(source),
+                (_, LightGroupSource::Light(i))
+                    if name.is_empty() && many.includes(&scene.lights[*i]) =>
+                {
+                    shared.push(source);
+                }
+                _ if name.is_empty() => own.push(source),
+                _ => separate.push(LightGroupSource::Shared(name.to_string(), vec![source])),
+            }
+        }
+        separate.append(&mut own);
         let pixels = scene.film.size.iter().map(|n| u64::from(*n)).product::<u64>().max(1);
         let max_groups = (FILM_BYTES / (pixels * GROUP_BYTES)) as usize;
         let max_light_groups = match merge_lights {
@@ -129,11 +182,14 @@ impl LightGroups {
             false => max_groups.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS),
         };
         if separate.len() + usize::from(!shared.is_empty()) > max_light_groups {
-            shared.splice(0..0, separate.drain(max_light_groups - 1..));
+            let rest: Vec<_> = separate.drain(max_light_groups - 1..).collect();
+            shared.splice(0..0, rest.iter().flat_map(|group| group.emitting().iter().cloned()));
+            shared.retain(|source| source.weight(scene) != [0.0; 3]);
         }
         members.extend(separate);
-        if !shared.is_empty() {
-            members.push(LightGroupSource::Shared(shared));
+        match shared.len() {
+            0 | 1 => members.append(&mut shared),
+            _ => members.push(LightGroupSource::Shared(String::new(), shared)),
         }
         if members.is_empty() {
             // The film needs at least one group, even for a black picture.
@@ -158,18 +214,25 @@ impl LightGroups {
     pub(crate) fn sources(&self, scene: &Scene) -> impl Iterator<Item = GroupedSource<'_>> {
         let members = self.members.iter().enumerate();
         members.flat_map(move |(group, member)| {
-            let is_shared = matches!(member, LightGroupSource::Shared(_));
-            member.emitting().iter().map(move |source| {
-                let emission = if is_shared { source.emission(scene) } else { [1.0; 3] };
-                GroupedSource { source, group, emission }
+            member.emitting().iter().map(move |source| GroupedSource {
+                source,
+                group,
+                emission: member.traced(source, scene),
             })
         })
     }
 
     /// Returns the light weight of each group in the picture of `scene`, which may differ from the
-    /// compiled scene in emissions and on/off switches, ambient light and background.
+    /// compiled scene in emissions and on/off switches, mixes of groups, ambient light and background.
     pub fn weights(&self, scene: &Scene) -> Vec<[f64; 3]> {
-        self.members.iter().map(|member| member.emission(scene)).collect()
+        let mut weights: Vec<_> = self.members.iter().map(|member| member.weight(scene)).collect();
+        let is_alone: Vec<bool> =
+            self.names(scene).iter().map(|name| *name == scene.film.solo).collect();
+        if is_alone.contains(&true) {
+            let others = weights.iter_mut().zip(&is_alone).filter(|(_, is_alone)| !**is_alone);
+            others.for_each(|(weight, _)| *weight = [0.0; 3]);
+        }
+        weights
     }
 
     /// Returns the name of each group, for layers of image files.
@@ -182,7 +245,10 @@ impl LightGroups {
                 _ => format!("light {}", i + 1),
             },
             LightGroupSource::Material(name) => name.clone(),
-            LightGroupSource::Shared(list) => format!("{} lights", list.len()),
+            LightGroupSource::Shared(name, list) if name.is_empty() => {
+                format!("{} lights", list.len())
+            }
+            LightGroupSource::Shared(name, _) => name.clone(),
         };
         self.members.iter().map(name).collect()
     }
@@ -206,16 +272,17 @@ impl LightGroups {
             LightGroupSource::Background => Some(distances.background()),
             LightGroupSource::Light(i) => ranges.get(i).copied(),
             LightGroupSource::Material(name) => range_of_material(name),
-            LightGroupSource::Shared(_) => None,
+            LightGroupSource::Shared(..) => None,
         };
-        let range_of_emission = |source: &LightGroupSource| {
-            let channels = source.emission(scene).into_iter().filter(|s| *s > 0.0);
+        let range_of_traced = |member: &LightGroupSource, source: &LightGroupSource| {
+            let channels = member.traced(source, scene).into_iter().filter(|s| *s > 0.0);
             let (low, high) = (channels.clone().reduce(f64::min)?, channels.reduce(f64::max)?);
             Some(range_of_one(source)?.times(low, high))
         };
         let range_of = |member: &LightGroupSource| {
-            let LightGroupSource::Shared(list) = member else { return range_of_one(member) };
-            list.iter().filter_map(range_of_emission).reduce(RadianceRange::or)
+            let LightGroupSource::Shared(_, list) = member else { return range_of_one(member) };
+            let ranges = list.iter().filter_map(|source| range_of_traced(member, source));
+            ranges.reduce(RadianceRange::or)
         };
         // The largest sample and its square have to be finite in the precision of the samples.
         let (min_exponent, max_exponent) =
@@ -243,6 +310,11 @@ pub(crate) fn emissive_materials(scene: &Scene) -> Vec<String> {
 /// Returns the emission of a light; black if it is off.
 fn emission(light: &Light) -> [f64; 3] {
     if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
+}
+
+/// Returns the factor of the light group `name`; 1 if the scene has none.
+fn mix(scene: &Scene, name: &str) -> [f64; 3] {
+    scene.groups.get(name).map_or([1.0; 3], LightGroup::factor)
 }
 
 /// Returns `true` if the light changes the picture: it emits, and surfaces reflect its light
@@ -389,7 +461,10 @@ mod tests {
             LightGroupSource::Light(MAX_LIGHT_GROUPS - 1),
             LightGroupSource::Material("lamp".to_string()),
         ];
-        assert_eq!(groups.members.last(), Some(&LightGroupSource::Shared(shared.to_vec())));
+        assert_eq!(
+            groups.members.last(),
+            Some(&LightGroupSource::Shared(String::new(), shared.to_vec()))
+        );
         let group = MAX_LIGHT_GROUPS - 1;
         let lamp = GroupedSource { source: &shared[1], group, emission: [4.0; 3] };
         assert_eq!(groups.sources(&scene).last(), Some(lamp));
@@ -413,9 +488,9 @@ mod tests {
         let few = members(MIN_LIGHTS - 1);
         assert_eq!(few[..single], lights(0..single));
         let rest = [lights(single..MIN_LIGHTS), vec![lamp.clone()]].concat();
-        assert_eq!(few[single..], [LightGroupSource::Shared(rest)]);
+        assert_eq!(few[single..], [LightGroupSource::Shared(String::new(), rest)]);
 
-        let shared = LightGroupSource::Shared(lights(0..MIN_LIGHTS));
+        let shared = LightGroupSource::Shared(String::new(), lights(0..MIN_LIGHTS));
         assert_eq!(members(MIN_LIGHTS), [LightGroupSource::Light(MIN_LIGHTS), lamp, shared]);
     }
 
@@ -429,7 +504,8 @@ mod tests {
             LightGroups::new(&scene, (true, false), false).members
         };
         let lights = |range: std::ops::Range<usize>| {
-            LightGroupSource::Shared(range.map(LightGroupSource::Light).collect())
+            let lights = range.map(LightGroupSource::Light).collect();
+            LightGroupSource::Shared(String::new(), lights)
         };
         let lamp = LightGroupSource::Material("lamp".to_string());
         let single = LightGroupSource::Light;
@@ -460,7 +536,10 @@ mod tests {
         let single = MAX_LIGHT_GROUPS - 1;
         assert_eq!(
             groups.members[single],
-            LightGroupSource::Shared((single..single + 3).map(LightGroupSource::Light).collect())
+            LightGroupSource::Shared(
+                String::new(),
+                (single..single + 3).map(LightGroupSource::Light).collect()
+            )
         );
         assert!(can_reuse(&groups, &scene, |s| s.lights[single - 1].intensity = 3.0));
         assert!(!can_reuse(&groups, &scene, |s| s.lights[single].intensity = 3.0));

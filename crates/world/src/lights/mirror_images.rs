@@ -29,8 +29,8 @@ const EVERYWHERE: f64 = 1e15;
 /// Flat face of a mirror.
 pub(crate) struct MirrorFace {
     /// Unit normal on the side that reflects.
-    normal: DVec3,
-    ball: BoundingSphere,
+    pub normal: DVec3,
+    pub ball: BoundingSphere,
     /// Reflection coefficient.
     strength: f64,
     /// Tangent of the angle by which the lobe spreads reflected rays.
@@ -85,6 +85,13 @@ impl MirrorFace {
         let backs = faces.iter().filter(|_| open && material.two_sided);
         let backs: Vec<Self> = backs.map(|face| Self { normal: -face.normal, ..*face }).collect();
         faces.into_iter().chain(backs).collect()
+    }
+}
+
+impl MirrorFace {
+    /// Returns `true` if the face reflects each ray into one direction.
+    pub fn is_clear(&self) -> bool {
+        self.spread == 0.0
     }
 }
 
