@@ -55,6 +55,28 @@ pub struct PixelGrid {
     pub window: Window,
 }
 
+/// Border between panels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Border {
+    /// Left of the side panels.
+    Side,
+    /// Below the outline.
+    Outline,
+    /// Above the plot.
+    Plot,
+}
+
+/// Places of the borders that the user has moved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Borders {
+    /// Columns of the side panels.
+    pub side: Option<u16>,
+    /// Rows of the outline.
+    pub outline: Option<u16>,
+    /// Rows of the plot.
+    pub plot: Option<u16>,
+}
+
 /// Zoom of the film in its panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Zoom {
@@ -71,6 +93,9 @@ pub const SMALLEST: [u16; 2] = [40, 12];
 
 /// Smallest height of the convergence plot in rows.
 const PLOT_ROWS: u16 = 8;
+/// Least size of side panels whose borders the user has moved.
+const LEAST_COLUMNS: u16 = 24;
+const LEAST_ROWS: u16 = 5;
 /// Smallest width of the terminal at which the side panels stay visible while the picture has the
 /// focus.
 const SIDE_FROM: u16 = 72;
@@ -92,6 +117,9 @@ impl Model {
             (100..160, true) => 46,
             _ => 52,
         };
+        if let Some(columns) = self.borders.side {
+            side = columns.min(width / 2).max(LEAST_COLUMNS);
+        }
         if self.fullscreen || width < SIDE_FROM && self.focus == Focus::Picture {
             side = 0;
         }
@@ -128,6 +156,16 @@ impl Model {
         })
     }
 
+    /// Moves a border between panels to a cell.
+    pub(super) fn move_border(&mut self, border: Border, [column, row]: [u16; 2]) {
+        let [width, height] = self.screen;
+        match border {
+            Border::Side => self.borders.side = Some(width.saturating_sub(column)),
+            Border::Outline => self.borders.outline = Some(row),
+            Border::Plot => self.borders.plot = Some(height.saturating_sub(row + 2)),
+        }
+    }
+
     /// Returns the number of half cells across a film pixel if the whole film is visible.
     pub fn fitting_scale(&self) -> f64 {
         let film = self.scene().film.size;
@@ -144,7 +182,10 @@ impl Model {
     /// watch` the first is the table of watched files, and the second is `None`.
     fn side_panels(&self, side: Rect) -> [Option<Rect>; 3] {
         let rows = side.height;
-        let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
+        let plot = match self.borders.plot.unwrap_or(rows * 3 / 10) {
+            moved if rows >= 3 * PLOT_ROWS + 6 => moved.clamp(PLOT_ROWS, rows - 2 * PLOT_ROWS),
+            _ => 0,
+        };
         // The outline and the inspector share `left` rows. In less than 16 rows, there is room for
         // one of them only.
         let left = rows - plot;
@@ -159,6 +200,9 @@ impl Model {
             _ if self.watch.is_some() => left,
             Focus::Outline if rows < 16 => left,
             _ if rows < 16 => 0,
+            _ if self.borders.outline.is_some() => {
+                self.borders.outline.unwrap_or(0).clamp(LEAST_ROWS, left - LEAST_ROWS)
+            }
             Focus::Outline if rows < 40 => needed.min(left * 3 / 5),
             _ => needed.min(left * 2 / 5),
         };
@@ -265,6 +309,22 @@ impl Zoom {
 }
 
 impl Layout {
+    /// Returns the border between panels in a cell.
+    pub fn border_at(&self, column: u16, row: u16) -> Option<Border> {
+        let side = self.outline.or(self.inspector)?;
+        let below = |area: Option<Rect>| {
+            area.is_some_and(|area| area.y > 0 && (area.y - 1..=area.y).contains(&row))
+        };
+        match column {
+            _ if row >= self.status.y => None,
+            _ if (side.x - 1..=side.x).contains(&column) => Some(Border::Side),
+            _ if column < side.x => None,
+            _ if below(self.plot) => Some(Border::Plot),
+            _ if below(self.inspector) => Some(Border::Outline),
+            _ => None,
+        }
+    }
+
     /// Returns the pixel of the film (column, row) that the cell at `column` and `row` of the
     /// screen shows at its centre. Returns `None` outside the picture.
     pub fn film_pixel(&self, column: u16, row: u16) -> Option<[usize; 2]> {
@@ -335,6 +395,36 @@ mod tests {
         assert!(at(200, 60, Focus::Picture).unwrap().plot.is_some());
         assert!(at(120, 36, Focus::Picture).unwrap().plot.is_some());
         assert!(at(80, 24, Focus::Picture).unwrap().inspector.is_some());
+    }
+
+    #[test]
+    fn borders_follow_the_mouse_within_limits() {
+        for (screen, border, to, height) in [
+            ([120, 36], Border::Outline, [90, 20], 20),
+            ([120, 36], Border::Outline, [90, 35], 19),
+            ([120, 36], Border::Outline, [90, 0], LEAST_ROWS),
+            ([80, 24], Border::Outline, [70, 11], 11),
+        ] {
+            let mut model = Model { screen, ..Model::default() };
+            let old = model.layout().unwrap();
+            let at = old.inspector.unwrap();
+            assert_eq!(old.border_at(at.x + 5, at.y), Some(border));
+            model.move_border(border, to);
+            assert_eq!(
+                model.layout().unwrap().outline.unwrap().height,
+                height,
+                "{screen:?} {to:?}"
+            );
+        }
+        for (column, width) in [(100, 100), (10, 60), (119, 96)] {
+            let mut model = Model { screen: [120, 36], ..Model::default() };
+            let old = model.layout().unwrap();
+            assert_eq!(old.border_at(old.picture.width, 9), Some(Border::Side));
+            model.move_border(Border::Side, [column, 9]);
+            assert_eq!(model.layout().unwrap().picture.width, width);
+            model.move_border(Border::Plot, [110, 20]);
+            assert_eq!(model.layout().unwrap().plot.unwrap().y, 20);
+        }
     }
 
     /// Checks that the picture fills the width or the height of its panel, and that each cell of
