@@ -66,16 +66,9 @@ pub enum Border {
     Plot,
 }
 
-/// Places of the borders that the user has moved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Borders {
-    /// Columns of the side panels.
-    pub side: Option<u16>,
-    /// Rows of the outline.
-    pub outline: Option<u16>,
-    /// Rows of the plot.
-    pub plot: Option<u16>,
-}
+/// Columns of the side panels, rows of the outline, rows of the plot, each `None` unless the user has
+/// moved the [`Border`] with this number.
+pub type Borders = [Option<u16>; 3];
 
 /// Zoom of the film in its panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,7 +110,8 @@ impl Model {
             (100..160, true) => 46,
             _ => 52,
         };
-        if let Some(columns) = self.borders.side {
+        let [moved_side, ..] = self.borders;
+        if let Some(columns) = moved_side {
             side = columns.min(width / 2).max(LEAST_COLUMNS);
         }
         if self.fullscreen || width < SIDE_FROM && self.focus == Focus::Picture {
@@ -159,11 +153,8 @@ impl Model {
     /// Moves a border between panels to a cell.
     pub(super) fn move_border(&mut self, border: Border, [column, row]: [u16; 2]) {
         let [width, height] = self.screen;
-        match border {
-            Border::Side => self.borders.side = Some(width.saturating_sub(column)),
-            Border::Outline => self.borders.outline = Some(row),
-            Border::Plot => self.borders.plot = Some(height.saturating_sub(row + 2)),
-        }
+        let sizes = [width.saturating_sub(column), row, height.saturating_sub(row + 2)];
+        self.borders[border as usize] = Some(sizes[border as usize]);
     }
 
     /// Returns the number of half cells across a film pixel if the whole film is visible.
@@ -182,7 +173,8 @@ impl Model {
     /// watch` the first is the table of watched files, and the second is `None`.
     fn side_panels(&self, side: Rect) -> [Option<Rect>; 3] {
         let rows = side.height;
-        let plot = match self.borders.plot.unwrap_or(rows * 3 / 10) {
+        let [_, moved_outline, moved_plot] = self.borders;
+        let plot = match moved_plot.unwrap_or(rows * 3 / 10) {
             moved if rows >= 3 * PLOT_ROWS + 6 => moved.clamp(PLOT_ROWS, rows - 2 * PLOT_ROWS),
             _ => 0,
         };
@@ -196,15 +188,13 @@ impl Model {
         // Camera, ambient light, background, film and integrator.
         let lines = 5 + headings + scene.cameras.len() + parts.iter().sum::<usize>() + unfolded;
         let needed = u16::try_from(lines + 2).unwrap_or(u16::MAX);
-        let outline = match self.focus {
+        let outline = match (self.focus, moved_outline) {
             _ if self.watch.is_some() => left,
-            Focus::Outline if rows < 16 => left,
+            (Focus::Outline, _) if rows < 16 => left,
             _ if rows < 16 => 0,
-            _ if self.borders.outline.is_some() => {
-                self.borders.outline.unwrap_or(0).clamp(LEAST_ROWS, left - LEAST_ROWS)
-            }
-            Focus::Outline if rows < 40 => needed.min(left * 3 / 5),
-            _ => needed.min(left * 2 / 5),
+            (_, Some(moved)) => moved.clamp(LEAST_ROWS, left - LEAST_ROWS),
+            (Focus::Outline, None) if rows < 40 => needed.min(left * 3 / 5),
+            (_, None) => needed.min(left * 2 / 5),
         };
         let part = |y, height| (height > 0).then_some(Rect { y: side.y + y, height, ..side });
         [part(0, outline), part(outline, left - outline), part(left, plot)]

@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo_render::film::{Display, PixelProbe};
+use zerkalo_render::film::{Display, PixelProbe, Window};
 use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{Snapshot, View, WatchReport};
 use zerkalo_scene::camera::Camera;
@@ -264,6 +264,8 @@ pub struct Model {
     pub autosaved: Option<Arc<Scene>>,
     /// Last requested parts of snapshots.
     pub requested: View,
+    /// Window of the film to which the render is limited.
+    pub region: Option<Window>,
     /// Zoom of the film in its panel; `None` if the whole film is visible.
     pub zoom: Option<Zoom>,
     pub loupe: Loupe,

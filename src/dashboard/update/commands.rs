@@ -282,8 +282,10 @@ pub static COMMANDS: &[Command] = &[
 
     command("rendering", "pause or resume", &[(Anywhere, "Space")], |c| c.pause()),
     command("rendering", "restart the picture", &[(Anywhere, "R")], |c| c.restart()),
+    command("rendering", "render only a region, or everything", &[(Anywhere, "Alt-r")], |c| c.toggle_region()).also("crop border window"),
     command("rendering", "stop at …", &[(Anywhere, "T")], |c| c.ask_stop()).also("samples rays spp time"),
     command("rendering", "noise targets and their times", &[(Anywhere, "N")], |c| c.open_noise_targets()).also("quality crisp samples rays"),
+    command("rendering", "measure the noise by bounce", &[(Anywhere, "Alt-n")], |c| c.measure_bounces()).also("why noisy cause share"),
     command("rendering", "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).also("settings").available(always),
 
     command("help", "find an action, field or part", &[(Anywhere, ": Ctrl-p")], |c| c.open_palette()).available(always).hints(&[
