@@ -390,7 +390,7 @@ mod tests {
     #[test]
     fn borders_follow_the_mouse_within_limits() {
         for (screen, border, to, height) in [
-            ([120, 36], Border::Outline, [90, 20], 20),
+            ([120, 36], Border::Outline, [90, 15], 15),
             ([120, 36], Border::Outline, [90, 35], 19),
             ([120, 36], Border::Outline, [90, 0], LEAST_ROWS),
             ([80, 24], Border::Outline, [70, 11], 11),
@@ -406,7 +406,7 @@ mod tests {
                 "{screen:?} {to:?}"
             );
         }
-        for (column, width) in [(100, 100), (10, 60), (119, 96)] {
+        for (column, width) in [(90, 90), (10, 60), (119, 96)] {
             let mut model = Model { screen: [120, 36], ..Model::default() };
             let old = model.layout().unwrap();
             assert_eq!(old.border_at(old.picture.width, 9), Some(Border::Side));

@@ -203,7 +203,8 @@ pub static COMMANDS: &[Command] = &[
     command("panels", "inspect, edit, confirm, choose", &[(Picture, "Enter"), (Outline, "Enter"), (Inspector, "Enter"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).hints(&[
         hint(&[H::In(Outline)], 2, "Enter", "inspect"),
         hint(&[H::In(Inspector)], 4, "Enter 0-9", "type"),
-        hint(&[H::List, H::Search], 2, "Enter", "take"),
+        hint(&[H::List], 2, "Enter", "take"),
+        hint(&[H::Search], 3, "Enter", "take"),
         hint(&[H::Form], 3, "Enter", "edit"),
         hint(&[H::Typing, H::Number], 1, "Enter", "confirm"),
         hint(&[H::Number], 2, "*2 /2 +.1 -=.1", "change it"),
@@ -215,7 +216,7 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::In(Inspector), H::Form], 1, "Up Down", "field"),
         hint(&[H::Form], 5, "letters /", "find"),
         hint(&[H::List, H::Search], 1, "Up Down", "choose"),
-        hint(&[H::Search], 3, "letters", "find"),
+        hint(&[H::Search], 2, "letters", "find"),
         hint(&[H::Watching], 2, "Up Down", "select"),
     ]),
     command("panels", "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).available(always),
