@@ -1,4 +1,5 @@
-//! Shares of the bounces in the noise of a picture. Noisy tiles are traced again with shorter paths.
+//! Shares of the bounces in the noise of a picture. The noisiest tiles are traced again with shorter
+//! paths.
 //!
 //! Let e(k) be the squared difference of the replicates' means, as displayed, of paths with at most k
 //! bounces. The share of bounce k is (e(k) - e(k - 1)) / e(all): the fall of the noise if paths end one
@@ -22,11 +23,11 @@ pub const BOUNCE_SHARES: usize = 4;
 type Differences = Vec<[f64; 3]>;
 
 impl RenderState {
-    /// Returns the share of each bounce in the noise of `tiles`, numbers with weights, as many of which as
-    /// `seconds` permit are traced, in their order. Returns `None` if these have no noise.
+    /// Returns the share of each bounce in the noise of `tiles`, as many of which as `seconds` permit
+    /// are traced, in their order. Returns `None` if these have no noise.
     pub(crate) fn bounce_shares(
         &self,
-        tiles: &[(usize, f64)],
+        tiles: &[usize],
         seconds: f64,
         pool: &rayon::ThreadPool,
     ) -> Option<[f64; BOUNCE_SHARES]> {
@@ -38,11 +39,9 @@ impl RenderState {
         };
         let started = Instant::now();
         let part = seconds / BOUNCE_SHARES as f64;
-        let traced = |world: &World<Double>, tiles: &[(usize, f64)]| -> Vec<Differences> {
+        let traced = |world: &World<Double>, tiles: &[usize]| -> Vec<Differences> {
             let tracer = world.camera_tracer(self.sampling());
-            pool.install(|| {
-                tiles.par_iter().map(|(tile, _)| self.differences(&tracer, *tile)).collect()
-            })
+            pool.install(|| tiles.par_iter().map(|tile| self.differences(&tracer, *tile)).collect())
         };
         let mut whole = Vec::new();
         for some in tiles.chunks(4 * pool.current_num_threads()) {
@@ -53,8 +52,7 @@ impl RenderState {
         }
         let tiles = &tiles[..whole.len()];
         let error = |differences: &[Differences]| -> f64 {
-            let pairs = tiles.iter().zip(differences);
-            pairs.map(|((tile, weight), of)| weight * self.displayed_error(*tile, of)).sum()
+            tiles.iter().zip(differences).map(|(tile, of)| self.displayed_error(*tile, of)).sum()
         };
         let all = error(&whole);
         let mut errors = [all; BOUNCE_SHARES];

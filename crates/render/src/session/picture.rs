@@ -44,7 +44,7 @@ impl<'a> Picture<'a> {
         }
     }
 
-    /// Traces tiles, mostly noisy ones, for about `seconds`. Returns the shares in their noise of paths
+    /// Traces the noisiest tiles for about `seconds`. Returns the shares in their noise of paths
     /// without a bounce, with one, with two, and with more. Returns `None` without noise, and if the
     /// session watches films.
     pub fn bounce_shares(&self, seconds: f64) -> Option<[f64; BOUNCE_SHARES]> {
@@ -52,21 +52,9 @@ impl<'a> Picture<'a> {
         let noise = |estimate: Option<TileNoise>| {
             estimate.map_or(0.0, |noise| noise.of_all().levels * f64::from(noise.pixels))
         };
-        let mut sum = 0.0;
-        let sums: Vec<_> = (render.schedule.tile_estimates().map(noise))
-            .map(|noise| {
-                sum += noise;
-                (sum, noise)
-            })
-            .collect();
-        // Tiles are drawn with probabilities in proportion to their noise. Multiples of the golden ratio
-        // are spread evenly, however many there are.
-        let drawn = |i: usize| {
-            let at = (i as f64 * 0.618_033_988_749_894_9).fract() * sum;
-            let tile = sums.partition_point(|(sum, _)| *sum <= at);
-            sums.get(tile).map(|(_, noise)| (tile, 1.0 / noise))
-        };
-        let tiles: Vec<_> = (0..sums.len()).filter_map(drawn).collect();
+        let noise: Vec<_> = render.schedule.tile_estimates().map(noise).collect();
+        let mut tiles: Vec<_> = (0..noise.len()).filter(|tile| noise[*tile] > 0.0).collect();
+        tiles.sort_by(|a, b| noise[*b].total_cmp(&noise[*a]));
         render.state.bounce_shares(&tiles, seconds, pool)
     }
 
