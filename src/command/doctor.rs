@@ -285,7 +285,7 @@ fn whole_frames(terminal: &Capabilities) -> &'static str {
 fn stills(terminal: &Capabilities) -> String {
     let missing = match Protocol::of(terminal) {
         Protocol::Sixel(colors) => return format!("crisp on o, by sixel in {colors} colours"),
-        Protocol::Blocks if terminal.kitty_graphics => "its kitty's protocol has no placeholders",
+        Protocol::Blocks if terminal.kitty_graphics => "its version of kitty has no placeholders",
         Protocol::Blocks if terminal.sixel => "sixel needs the size of a cell in pixels",
         Protocol::Blocks => "neither kitty's protocol nor sixel",
         protocol => return format!("crisp on o, by {}", protocol.name()),

@@ -8,9 +8,10 @@ use zerkalo_scene::edit::Widget;
 /// covers the hint line.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
-        Some(Overlay::Pick(_) | Overlay::NoiseTargets(_) | Overlay::Question(_)) => HintLine::List,
+        Some(Overlay::NoiseTargets(_) | Overlay::Question(_)) => HintLine::List,
+        Some(Overlay::Pick(_)) => HintLine::Search,
         Some(Overlay::ViewerImage(_)) => return None,
-        None | Some(Overlay::Form(_)) if model.field_list().filter.is_some() => HintLine::List,
+        None | Some(Overlay::Form(_)) if model.field_list().filter.is_some() => HintLine::Search,
         Some(Overlay::Prompt(_)) => HintLine::Typing,
         None | Some(Overlay::Form(_)) if model.field_list().editor.is_some() => {
             let lines = model.field_lines();
@@ -59,9 +60,11 @@ mod tests {
                         HintLine::First => KeyContext::Picture,
                         HintLine::In(context) => *context,
                         HintLine::Watching => KeyContext::Outline,
-                        HintLine::List | HintLine::Form | HintLine::Typing | HintLine::Number => {
-                            KeyContext::Overlay
-                        }
+                        HintLine::List
+                        | HintLine::Search
+                        | HintLine::Form
+                        | HintLine::Typing
+                        | HintLine::Number => KeyContext::Overlay,
                     };
                     let has_key =
                         command.keys.iter().any(|(c, _)| context.chain().any(|other| other == *c));

@@ -55,6 +55,21 @@ pub struct PixelGrid {
     pub window: Window,
 }
 
+/// Border between panels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Border {
+    /// Left of the side panels.
+    Side,
+    /// Below the outline.
+    Outline,
+    /// Above the plot.
+    Plot,
+}
+
+/// Columns of the side panels, rows of the outline, rows of the plot, each `None` unless the user has
+/// moved the [`Border`] with this number.
+pub type Borders = [Option<u16>; 3];
+
 /// Zoom of the film in its panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Zoom {
@@ -71,6 +86,9 @@ pub const SMALLEST: [u16; 2] = [40, 12];
 
 /// Smallest height of the convergence plot in rows.
 const PLOT_ROWS: u16 = 8;
+/// Least size of side panels whose borders the user has moved.
+const LEAST_COLUMNS: u16 = 24;
+const LEAST_ROWS: u16 = 5;
 /// Smallest width of the terminal at which the side panels stay visible while the picture has the
 /// focus.
 const SIDE_FROM: u16 = 72;
@@ -92,6 +110,10 @@ impl Model {
             (100..160, true) => 46,
             _ => 52,
         };
+        let [moved_side, ..] = self.borders;
+        if let Some(columns) = moved_side {
+            side = columns.min(width / 2).max(LEAST_COLUMNS);
+        }
         if self.fullscreen || width < SIDE_FROM && self.focus == Focus::Picture {
             side = 0;
         }
@@ -128,6 +150,13 @@ impl Model {
         })
     }
 
+    /// Moves a border between panels to a cell.
+    pub(super) fn move_border(&mut self, border: Border, [column, row]: [u16; 2]) {
+        let [width, height] = self.screen;
+        let sizes = [width.saturating_sub(column), row, height.saturating_sub(row + 2)];
+        self.borders[border as usize] = Some(sizes[border as usize]);
+    }
+
     /// Returns the number of half cells across a film pixel if the whole film is visible.
     pub fn fitting_scale(&self) -> f64 {
         let film = self.scene().film.size;
@@ -144,7 +173,11 @@ impl Model {
     /// watch` the first is the table of watched files, and the second is `None`.
     fn side_panels(&self, side: Rect) -> [Option<Rect>; 3] {
         let rows = side.height;
-        let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
+        let [_, moved_outline, moved_plot] = self.borders;
+        let plot = match moved_plot.unwrap_or(rows * 3 / 10) {
+            moved if rows >= 3 * PLOT_ROWS + 6 => moved.clamp(PLOT_ROWS, rows - 2 * PLOT_ROWS),
+            _ => 0,
+        };
         // The outline and the inspector share `left` rows. In less than 16 rows, there is room for
         // one of them only.
         let left = rows - plot;
@@ -156,12 +189,13 @@ impl Model {
         // Camera, ambient light, background, film and integrator.
         let lines = 5 + headings + scene.cameras.len() + parts.iter().sum::<usize>() + unfolded;
         let needed = u16::try_from(lines + 2).unwrap_or(u16::MAX);
-        let outline = match self.focus {
+        let outline = match (self.focus, moved_outline) {
             _ if self.watch.is_some() => left,
-            Focus::Outline if rows < 16 => left,
+            (Focus::Outline, _) if rows < 16 => left,
             _ if rows < 16 => 0,
-            Focus::Outline if rows < 40 => needed.min(left * 3 / 5),
-            _ => needed.min(left * 2 / 5),
+            (_, Some(moved)) => moved.clamp(LEAST_ROWS, left - LEAST_ROWS),
+            (Focus::Outline, None) if rows < 40 => needed.min(left * 3 / 5),
+            (_, None) => needed.min(left * 2 / 5),
         };
         let part = |y, height| (height > 0).then_some(Rect { y: side.y + y, height, ..side });
         [part(0, outline), part(outline, left - outline), part(left, plot)]
@@ -266,6 +300,22 @@ impl Zoom {
 }
 
 impl Layout {
+    /// Returns the border between panels in a cell.
+    pub fn border_at(&self, column: u16, row: u16) -> Option<Border> {
+        let side = self.outline.or(self.inspector)?;
+        let below = |area: Option<Rect>| {
+            area.is_some_and(|area| area.y > 0 && (area.y - 1..=area.y).contains(&row))
+        };
+        match column {
+            _ if row >= self.status.y => None,
+            _ if (side.x - 1..=side.x).contains(&column) => Some(Border::Side),
+            _ if column < side.x => None,
+            _ if below(self.plot) => Some(Border::Plot),
+            _ if below(self.inspector) => Some(Border::Outline),
+            _ => None,
+        }
+    }
+
     /// Returns the pixel of the film (column, row) that the cell at `column` and `row` of the
     /// screen shows at its centre. Returns `None` outside the picture.
     pub fn film_pixel(&self, column: u16, row: u16) -> Option<[usize; 2]> {
@@ -336,6 +386,36 @@ mod tests {
         assert!(at(200, 60, Focus::Picture).unwrap().plot.is_some());
         assert!(at(120, 36, Focus::Picture).unwrap().plot.is_some());
         assert!(at(80, 24, Focus::Picture).unwrap().inspector.is_some());
+    }
+
+    #[test]
+    fn borders_follow_the_mouse_within_limits() {
+        for (screen, border, to, height) in [
+            ([120, 36], Border::Outline, [90, 15], 15),
+            ([120, 36], Border::Outline, [90, 35], 19),
+            ([120, 36], Border::Outline, [90, 0], LEAST_ROWS),
+            ([80, 24], Border::Outline, [70, 11], 11),
+        ] {
+            let mut model = Model { screen, ..Model::default() };
+            let old = model.layout().unwrap();
+            let at = old.inspector.unwrap();
+            assert_eq!(old.border_at(at.x + 5, at.y), Some(border));
+            model.move_border(border, to);
+            assert_eq!(
+                model.layout().unwrap().outline.unwrap().height,
+                height,
+                "{screen:?} {to:?}"
+            );
+        }
+        for (column, width) in [(90, 90), (10, 60), (119, 96)] {
+            let mut model = Model { screen: [120, 36], ..Model::default() };
+            let old = model.layout().unwrap();
+            assert_eq!(old.border_at(old.picture.width, 9), Some(Border::Side));
+            model.move_border(Border::Side, [column, 9]);
+            assert_eq!(model.layout().unwrap().picture.width, width);
+            model.move_border(Border::Plot, [110, 20]);
+            assert_eq!(model.layout().unwrap().plot.unwrap().y, 20);
+        }
     }
 
     /// Checks that the picture fills the width or the height of its panel, and that each cell of

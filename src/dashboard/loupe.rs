@@ -139,10 +139,14 @@ impl Model {
     /// target is kept if its window has half as much.
     fn noisiest(&self, snapshot: &Snapshot, is_new: bool) -> Option<[usize; 2]> {
         let (hits, picture) = (snapshot.first_hits.as_deref()?, snapshot.picture.as_ref()?);
-        let [columns, rows] = [hits.columns, hits.rows];
-        if [picture.cols, picture.rows] != [columns, rows] {
+        if hits.window != snapshot.window {
             return None;
         }
+        let [columns, rows] = [picture.cols, picture.rows];
+        let film_pixel = |i: usize| {
+            let pixel = [(0, i % columns, columns), (1, i / columns, rows)];
+            pixel.map(|(axis, at, cells)| hits.window.pixel(axis, at, cells))
+        };
         let mut counts = BTreeMap::new();
         let mirrors = hits.texels.iter().filter(|hit| hit.reflects);
         mirrors.for_each(|hit| *counts.entry(hit.object).or_insert(0) += 1);
@@ -153,15 +157,15 @@ impl Model {
         };
         let largest = counts.into_iter().max_by_key(|(o, count)| (is_the_mirror(*o), *count));
         let largest = largest.map(|(object, _)| object);
-        let is_mirror = |i: usize| largest.is_none_or(|object| hits.texels[i].object == object);
+        let object = |i: usize| hits.at_pixel(film_pixel(i)).and_then(|hit| hit.object);
+        let is_mirror = |i: usize| largest.is_none_or(|mirror| object(i) == mirror);
         let (to_8, radiance) = (self.display.to_8(), picture.mixed(&snapshot.weights));
         let levels: Vec<_> = radiance.iter().map(|c| to_8(c.map(f64::from))[1]).collect();
         let (tiles, size) = (&snapshot.tiles, LARGEST.map(usize::from));
         let window_of = |[x, y]: [usize; 2]| [x / size[0], y / (2 * size[1])];
         let mut windows: BTreeMap<[usize; 2], f64> = BTreeMap::new();
         for i in (0..levels.len()).filter(|i| is_mirror(*i)) {
-            let pixel = [(0, i % columns, columns), (1, i / columns, rows)];
-            let pixel = pixel.map(|(axis, at, cells)| hits.window.pixel(axis, at, cells));
+            let pixel = film_pixel(i);
             let [x, y] = pixel.map(|n| n / TILE);
             let beside = [i + 1, i + columns].into_iter();
             let beside = beside.filter(|n| *n < levels.len() && is_mirror(*n));

@@ -1,10 +1,14 @@
-//! Marks of the lights in the picture: their cells, which drawing and mouse handling share.
+//! Marks in the picture: cells of the lights, masks of what is outlined.
 
 use crate::dashboard::{DisplayChannel, Layout, Mode, Model, Overlay};
 use glam::DVec3;
+use zerkalo_render::FirstHitBuffer;
+use zerkalo_render::film::Window;
 use zerkalo_scene::camera::CompiledCamera;
 use zerkalo_scene::edit::{Target, bounds};
 use zerkalo_scene::light::Light;
+use zerkalo_terminal::cells::Raster;
+use zerkalo_world::FirstHit;
 
 /// Mark of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +37,80 @@ const ARROWS: [(char, [i16; 2]); 8] = [
 /// projection gives the arrow.
 const ARROW_SHARE: f64 = 0.05;
 
+/// Image of a window of the film that is white where something is outlined.
+pub type Mask = (Raster, Window);
+
+/// Returns a function that returns `true` if the first hit of a camera ray is on the selection.
+fn is_selected(model: &Model) -> impl Fn(&FirstHit) -> bool {
+    let all = match &model.selection {
+        Target::Part(i, _) => Target::Object(*i).solids(model.scene()),
+        _ => Vec::new(),
+    };
+    let own = model.selection.solids(model.scene());
+    let is_own = move |part: u32| all.get(part as usize).is_some_and(|solid| own.contains(solid));
+    move |hit| is_on(model, hit, &is_own)
+}
+
+fn is_on(model: &Model, hit: &FirstHit, is_own_part: impl Fn(u32) -> bool) -> bool {
+    let Some(index) = hit.object.map(|object| object as usize) else { return false };
+    match &model.selection {
+        Target::Object(selected) => *selected == index,
+        Target::Part(selected, _) => *selected == index && is_own_part(hit.part),
+        Target::Material(name) => {
+            model.scene().objects.get(index).is_some_and(|object| object.names_material(name))
+        }
+        Target::Camera
+        | Target::View(_)
+        | Target::Group(_)
+        | Target::Light(_)
+        | Target::Settings(_) => false,
+    }
+}
+
 impl Model {
+    /// Returns what is outlined in the picture: the selection while it is marked, and the region that
+    /// is rendered.
+    pub fn outlined(&self) -> Vec<Mask> {
+        let selected = self.selection_mask().filter(|_| self.shows_marks());
+        let region = self.region.and_then(|region| {
+            self.mask(|hits, i| {
+                let [column, row] = [i % hits.columns, i / hits.columns];
+                region.contains([
+                    hits.window.pixel(0, column, hits.columns),
+                    hits.window.pixel(1, row, hits.rows),
+                ])
+            })
+        });
+        selected.into_iter().chain(region).collect()
+    }
+
+    fn selection_mask(&self) -> Option<Mask> {
+        let is_selected = is_selected(self);
+        self.mask(|hits, i| is_selected(&hits.texels[i]))
+    }
+
+    /// Returns an image of the first hits that is white where `is_in` is `true`.
+    fn mask(&self, is_in: impl Fn(&FirstHitBuffer, usize) -> bool) -> Option<Mask> {
+        let hits = self.snapshot.as_ref()?.first_hits.as_deref()?;
+        let white_if = |inside: bool| [if inside { 255 } else { 0 }; 3];
+        Some((Raster::from_fn(hits.columns, hits.rows, |i| white_if(is_in(hits, i))), hits.window))
+    }
+
+    /// Returns the window of the film in which the selection is visible.
+    pub fn selection_window(&self) -> Option<Window> {
+        let (mask, window) = self.selection_mask()?;
+        let inside = (0..mask.pixels.len()).filter(|i| mask.pixels[*i] == [255; 3]);
+        let pixels = inside.map(|i| {
+            let [column, row] = [i % mask.width, i / mask.width];
+            [window.pixel(0, column, mask.width), window.pixel(1, row, mask.height)]
+        });
+        let ends = pixels.map(|pixel| [pixel, pixel]);
+        let [low, high] = ends.reduce(|[low, high], [pixel, _]| {
+            [[0, 1].map(|i| low[i].min(pixel[i])), [0, 1].map(|i| high[i].max(pixel[i]))]
+        })?;
+        Some(Window { origin: low, size: [0, 1].map(|i| high[i] - low[i] + 1) })
+    }
+
     /// Returns `true` if the selection and the lights are marked: while the user works on something
     /// that has a place in the picture.
     pub fn shows_marks(&self) -> bool {

@@ -5,6 +5,7 @@ use crate::dashboard::pictures::KeptPicture;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
+use zerkalo_render::BOUNCE_SHARES;
 use zerkalo_render::film::Display;
 use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{Snapshot, View, WatchReport};
@@ -28,12 +29,14 @@ pub enum Message {
     Watched(Box<WatchReport>),
     /// Result of [`Effect::Pin`].
     Pinned(KeptPicture),
+    /// Result of [`Effect::MeasureBounces`]; `None` without noise.
+    Bounces(Option<[f64; BOUNCE_SHARES]>),
     /// Result of [`Effect::Save`]: the scene, and the path of the written file or the error.
     Saved(Arc<Scene>, Result<PathBuf, SaveError>),
     /// Result of [`Effect::Load`].
     Loaded(Box<Result<Arc<Scene>, SceneErrors>>),
-    /// Another program has written a valid scene to the scene file.
-    ChangedOnDisk,
+    /// Another program has written a valid scene to the scene file, with this difference.
+    ChangedOnDisk(String),
     /// Another program has written errors to the scene file.
     BrokenOnDisk(SceneErrors),
     /// The scene file is again as it was before another program wrote errors to it.
@@ -189,6 +192,9 @@ pub enum Effect {
     View(View),
     /// Discard all samples and restart rendering.
     Restart,
+    /// Measure the shares of the bounces in the noise, for this time in seconds, and return them as
+    /// [`Message::Bounces`].
+    MeasureBounces(f64),
     /// Return the current picture as [`Message::Pinned`].
     Pin {
         /// Label of the last undo step of its scene.

@@ -1,7 +1,7 @@
 //! Model: the complete state of the dashboard, from which the screen is drawn.
 
 use crate::dashboard::graphics::Graphics;
-use crate::dashboard::layout::Zoom;
+use crate::dashboard::layout::{Border, Borders, Zoom};
 use crate::dashboard::loupe::Loupe;
 use crate::dashboard::pictures::{KeptPicture, Pictures};
 use crate::dashboard::{
@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo_render::film::{Display, PixelProbe};
+use zerkalo_render::film::{Display, PixelProbe, Window};
 use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{Snapshot, View, WatchReport};
 use zerkalo_scene::camera::Camera;
@@ -159,6 +159,8 @@ pub struct Drag {
     pub on_number: bool,
     /// `true` if the drag moves the selection, because it began there.
     pub moves: bool,
+    /// Border between panels on which the button was pressed.
+    pub border: Option<Border>,
 }
 
 impl Drag {
@@ -166,7 +168,7 @@ impl Drag {
     pub(super) fn new(button: Button, Mouse { column, row, modified, .. }: Mouse) -> Self {
         let last = [column, row];
         let (moved, in_picture, on_number, moves) = (false, false, false, false);
-        Self { button, modified, last, moved, in_picture, on_number, moves }
+        Self { button, modified, last, moved, in_picture, on_number, moves, border: None }
     }
 }
 
@@ -199,6 +201,10 @@ pub struct Model {
     pub marked: Vec<Target>,
     /// Compounds whose parts are listed in the outline.
     pub unfolded: BTreeSet<Target>,
+    /// Groups of fields that are folded, each by the key of its first field.
+    pub folded: BTreeSet<String>,
+    /// Borders between panels that the user has moved.
+    pub borders: Borders,
     /// `true` if a deletion has chosen the selection. It is not deleted before the user selects it.
     pub chosen_by_deletion: bool,
     pub focus: Focus,
@@ -258,6 +264,8 @@ pub struct Model {
     pub autosaved: Option<Arc<Scene>>,
     /// Last requested parts of snapshots.
     pub requested: View,
+    /// Window of the film to which the render is limited.
+    pub region: Option<Window>,
     /// Zoom of the film in its panel; `None` if the whole film is visible.
     pub zoom: Option<Zoom>,
     pub loupe: Loupe,

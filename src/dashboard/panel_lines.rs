@@ -97,6 +97,8 @@ pub enum RowAct {
     Add,
     /// Shows or hides the rarely used properties.
     Fold,
+    /// Shows the fields of a folded group with a heading.
+    Unfold,
 }
 
 impl FieldLine {
@@ -242,24 +244,52 @@ fn fields(scene: &Scene, target: &Target) -> Vec<PanelLine> {
         .collect()
 }
 
+/// Key of the group of fields under the heading of a material.
+pub const MATERIAL: &str = "fields of the material";
+
+/// Hides the fields of `folded` groups: those that are indented below another field, or that follow
+/// a heading.
+fn without(folded: &BTreeSet<String>, lines: Vec<PanelLine>) -> Vec<PanelLine> {
+    let mut hidden_from = usize::MAX;
+    let visible = |line| match line {
+        PanelLine::Heading(title) if folded.contains(MATERIAL) => {
+            hidden_from = 0;
+            let (act, label) = (RowAct::Unfold, format!("▸ {title}"));
+            Some(PanelLine::Entry(Box::new(FieldLine { act, label, ..FieldLine::default() })))
+        }
+        PanelLine::Heading(_) => Some(line),
+        PanelLine::Entry(mut field) => {
+            let Property { depth, key, .. } = &field.property;
+            if *depth >= hidden_from {
+                return None;
+            }
+            let is_folded = folded.contains(key.as_str());
+            hidden_from = if is_folded { depth + 1 } else { usize::MAX };
+            field.label.extend(is_folded.then_some(" ▸"));
+            Some(PanelLine::Entry(field))
+        }
+    };
+    lines.into_iter().filter_map(visible).collect()
+}
+
 /// Returns the position of a material's property among the [`COMMON`] ones.
 fn common(row: &Property) -> Option<usize> {
     COMMON.iter().position(|key| row.key.split('.').next() == Some(*key))
 }
 
 /// Returns the lines that are visible in the state `list`.
-fn visible(lines: Vec<PanelLine>, list: &FieldList) -> Vec<PanelLine> {
+fn visible(lines: Vec<PanelLine>, list: &FieldList, folded: &BTreeSet<String>) -> Vec<PanelLine> {
     if let Some(filter) = &list.filter {
         let is_found = |line: &PanelLine| {
             line.entry().is_some_and(|field| has_words(&field.label, filter.text()))
         };
         return lines.into_iter().filter(is_found).collect();
     }
+    let mut lines = without(folded, lines);
     let is_rare = |line: &&PanelLine| line.entry().is_some_and(|field| field.is_rare);
     let rare = lines.iter().filter(is_rare).count();
     let label = if list.unfolded { "▾ fewer".to_string() } else { format!("▸ {rare} more") };
     let fold = FieldLine { act: RowAct::Fold, label, ..FieldLine::default() };
-    let mut lines = lines;
     lines.retain(|line| list.unfolded || !is_rare(&line));
     lines.extend((rare > 0).then(|| PanelLine::Entry(Box::new(fold))));
     lines
@@ -306,7 +336,25 @@ impl Model {
             Some(Overlay::Form(open)) => form(open, self.history.scene()),
             _ => inspector(self.scene(), &self.selection),
         };
-        visible(lines, self.field_list())
+        visible(lines, self.field_list(), &self.folded)
+    }
+
+    /// Returns the key of the group of the field under the cursor and the index of its first line,
+    /// which is the field itself if others are indented below it; `None` if it has no group.
+    pub fn field_group(&self) -> Option<(String, usize)> {
+        let (lines, cursor) = (self.field_lines(), self.field_list().cursor);
+        let depth = |line: &PanelLine| line.entry().map(|field| field.property.depth);
+        let own = lines.get(cursor).and_then(depth)?;
+        let key = |at: usize| Some((lines[at].entry()?.property.key.to_string(), at));
+        let heads = lines.get(cursor + 1).and_then(depth).is_some_and(|below| below > own);
+        if heads || lines[cursor].entry().is_some_and(|f| self.folded.contains(&*f.property.key)) {
+            return key(cursor);
+        }
+        let above = (0..cursor).rev().find(|i| depth(&lines[*i]).is_none_or(|d| d < own))?;
+        match lines[above] {
+            PanelLine::Heading(_) => Some((MATERIAL.to_string(), above)),
+            PanelLine::Entry(_) => key(above),
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 //! render.
 
 mod noise;
+mod noise_by_bounce;
 
 use crate::harness::*;
 use std::sync::mpsc::channel;

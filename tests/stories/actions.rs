@@ -442,6 +442,15 @@ fn picture_stories() -> Vec<Story> {
             // The noise target changes from 0.5 to the next finer one in the list.
             d.model.stop.noise_levels == Some(0.25) && d.model.overlay.is_none()
         }),
+        story("measure the noise by bounce", "Alt-n", |_, d| {
+            d.asked(|e| matches!(e, Effect::MeasureBounces(_)))
+        }),
+        story("render only a region, or everything", "Z Z Z Alt-r", |_, d| {
+            d.model.region == Some(d.model.layout().unwrap().window)
+        }),
+        selected("fold or unfold a group of fields", BALL, "Enter / `rad` Enter Alt-f", |_, d| {
+            d.model.folded.contains("shape")
+        }),
         story("next colour mode of the terminal", "#", |_, d| d.model.colors == Colors::Indexed),
         story("find an action, field or part", ": `mirror sm` Enter", |_, d| {
             mirror(d).roughness < 0.0475

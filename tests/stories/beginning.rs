@@ -66,7 +66,7 @@ fn banner_of_a_broken_file_goes_when_the_file_is_good_again() {
     assert!(desk.model.file.broken.is_none());
     desk.keys("]");
     desk.send(Message::BrokenOnDisk(errors()));
-    desk.send(Message::ChangedOnDisk);
+    desk.send(Message::ChangedOnDisk(String::new()));
     desk.keys("`k`");
     assert!(desk.model.file.broken.is_none() && desk.model.is_unsaved());
 }

@@ -101,20 +101,20 @@ fn external_change_reloads_unless_edits_would_be_lost() {
     desk.select(Target::Object(1));
     let other = ROOM.replace("radius = 0.5", "radius = 0.25");
     desk.disk.insert(FILE.into(), other.clone());
-    desk.send(Message::ChangedOnDisk);
+    desk.send(Message::ChangedOnDisk(String::new()));
     assert_eq!(desk.text(), other);
     assert_eq!(desk.model.selection, Target::Object(1), "found again by its name");
     desk.keys("]");
     desk.disk.insert(FILE.into(), ROOM.into());
-    desk.send(Message::ChangedOnDisk);
+    desk.send(Message::ChangedOnDisk(String::new()));
     desk.keys("Enter");
     assert!(desk.text().contains("0.25") && desk.model.is_unsaved(), "mine are kept");
-    desk.send(Message::ChangedOnDisk);
+    desk.send(Message::ChangedOnDisk(String::new()));
     desk.keys("`r`");
     assert_eq!((desk.text().as_str(), desk.model.is_unsaved()), (ROOM, false));
     // A change of the file is reported, but it does not close an open form.
     desk.keys("a Enter");
-    desk.send(Message::ChangedOnDisk);
+    desk.send(Message::ChangedOnDisk(String::new()));
     assert!(matches!(desk.model.overlay, Some(Overlay::Form(_))));
     assert!(desk.notice().contains("Ctrl-o"));
 }
@@ -168,14 +168,14 @@ fn unreadable_file_loads_after_it_is_fixed() {
 fn error_in_changed_file_keeps_scene() {
     let mut desk = Desk::new(ROOM);
     desk.disk.insert(FILE.into(), ROOM.replace("[film]", "[flim]"));
-    desk.send(Message::ChangedOnDisk);
+    desk.send(Message::ChangedOnDisk(String::new()));
     assert!(desk.notice().contains("room.toml:2") && desk.notice().contains("flim"));
     assert_eq!(desk.text(), ROOM);
     desk.keys("] Ctrl-s");
     assert!(matches!(desk.model.overlay, Some(Overlay::Question(_))), "not over it unasked");
     desk.keys("Esc u");
     desk.disk.insert(FILE.into(), ROOM.into());
-    desk.send(Message::ChangedOnDisk);
+    desk.send(Message::ChangedOnDisk(String::new()));
     assert!(desk.model.file.broken.is_none());
 }
 

@@ -210,6 +210,19 @@ fn mark_picks_and_moves_its_light() {
 }
 
 #[test]
+fn drag_of_a_border_moves_it() {
+    let mut desk = Desk::new(ROOM);
+    let old = desk.model.layout().unwrap();
+    desk.drag(Button::Left, [old.picture.width, 5], [-7, 0]);
+    let new = desk.model.layout().unwrap();
+    assert_eq!(new.picture.width, old.picture.width - 7);
+    assert!(desk.asked(|e| matches!(e, Effect::View(_))) && desk.model.free_view.is_none());
+    let inspector = new.inspector.unwrap();
+    desk.drag(Button::Left, [inspector.x + 4, inspector.y], [0, 3]);
+    assert_eq!(desk.model.layout().unwrap().inspector.unwrap().y, inspector.y + 3);
+}
+
+#[test]
 fn drag_over_a_number_steps_it() {
     let mut desk = Desk::new(ROOM);
     desk.select(Target::Material("mirror".into()));

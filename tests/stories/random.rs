@@ -4,7 +4,7 @@
 use super::*;
 
 /// Number of events on each scene; `ZERKALO_EVENTS` sets another.
-const EVENTS: usize = 2_000;
+const EVENTS: usize = 2_400;
 /// Label of the command that quits the program.
 const QUIT: &str = "quit";
 

@@ -86,6 +86,8 @@ const MOUSE: &[(&str, &str)] = &[
     ("wheel with Ctrl or Alt, or over the loupe", "zooms the picture"),
     ("click in a panel or list", "selects; a second time: opens"),
     ("click with Ctrl or Alt in the outline", "marks or unmarks the part"),
+    ("click on the heading of a material", "folds its fields"),
+    ("drag a border between panels", "moves it"),
     ("drag a number in the inspector or a form", "changes its value"),
     ("wheel over the field under the cursor", "steps its value; elsewhere: scrolls"),
 ];

@@ -1,7 +1,7 @@
 //! Stories of stray keys: in no widget does text that is typed run a command.
 
 use super::*;
-use zerkalo_scene::edit::Widget;
+use zerkalo::dashboard::model::Mode;
 use zerkalo_scene::material::Preset;
 
 /// Keys that a hand may hit anywhere, and that must change nothing.
@@ -54,14 +54,10 @@ fn stray_keys_change_nothing_on_any_row() {
             desk.model.inspector.cursor = line;
             let place = format!("line {line} of {target:?}");
             unchanged(&mut desk, &place, &[&STRAY[..], &["x"]].concat());
-            let types_letters = field.is_some_and(|field| {
-                !matches!(field.property.widget, Widget::Numbers | Widget::Switch)
-            });
-            if types_letters {
-                desk.keys("Tab Tab");
-                desk.model.inspector.cursor = line;
-                unchanged(&mut desk, &place, &["g", "o", "l", "d", "x", "D"]);
-            }
+            desk.keys("Tab Tab");
+            desk.model.inspector.cursor = line;
+            desk.keys("w");
+            assert_eq!(desk.model.mode, Mode::Fly, "letters are commands on {place}");
         }
     }
 }
@@ -87,6 +83,30 @@ fn no_command_runs_while_text_is_typed() {
         desk.keys(keys);
         unchanged(&mut desk, place, &commands());
     }
+}
+
+#[test]
+fn groups_of_fields_fold() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Target::Object(1));
+    let labels = |desk: &Desk| {
+        let lines = desk.model.field_lines();
+        lines.iter().filter_map(|line| Some(line.entry()?.label.clone())).collect::<Vec<_>>()
+    };
+    desk.keys("Enter / `rad` Enter Alt-f");
+    assert_eq!(labels(&desk)[2..4], ["shape ▸", "transform"], "radius is in the shape");
+    desk.keys("/ `rad` Enter");
+    assert!(labels(&desk).contains(&"radius".to_string()), "what is found unfolds");
+    desk.keys("/ `rough` Enter Alt-f");
+    assert!(labels(&desk)[8].starts_with("▸ material red"), "{:?}", labels(&desk));
+    desk.keys("Enter Up Up Up Alt-f Alt-f");
+    assert!(labels(&desk).contains(&"radius".to_string()));
+    let (rows, _) = desk.model.inspector_rows().unwrap();
+    let lines = desk.model.field_lines();
+    let heading = lines.iter().position(|line| line.entry().is_none()).unwrap();
+    desk.click(rows.x + 3, rows.y + (heading - desk.model.inspector.scroll) as u16);
+    assert!(!labels(&desk).contains(&"roughness".to_string()));
+    assert_eq!(desk.text(), ROOM);
 }
 
 /// Returns the names that the list which `key` opens finds for `text`.
@@ -131,7 +151,7 @@ fn fields_of_the_inspector_keep_the_cursor_and_take_words() {
     let Shape::Sphere(ball) = &desk.scene().objects[1].shape else { panic!("no ball") };
     assert_eq!((ball.radius, desk.scene().objects.len()), (0.4, 3));
     desk.select(Target::Material("red".into()));
-    desk.keys("Home `gold` Enter");
+    desk.keys("Home Enter `gold` Enter");
     assert_eq!(desk.scene().materials["red"].preset, Some(Preset::Gold), "{}", desk.notice());
     desk.keys("[ [ [ [ [ [ [ [");
     assert_eq!(desk.scene().materials["red"].roughness, 0.0);
@@ -246,7 +266,7 @@ fn deletion_takes_only_what_was_selected_and_undo_selects_it() {
 fn colours_and_calculations_are_typed_into_fields() {
     let mut desk = Desk::new(ROOM);
     desk.select(Target::Material("red".into()));
-    desk.keys("Enter / `col` Enter `gold` Enter");
+    desk.keys("Enter / `col` Enter Enter `gold` Enter");
     let gold = zerkalo_scene::value::Color::from_hex("#ffd700").unwrap();
     assert_eq!(desk.scene().materials["red"].color, gold);
     desk.keys("/ `refl` Enter `.25` Enter *");

@@ -68,6 +68,31 @@ fn wheel_zooms_about_the_mouse() {
     assert!(window(&desk).size[0] < 320);
 }
 
+#[test]
+fn region_is_what_is_zoomed_or_selected() {
+    let mut desk = large();
+    let region = |desk: &Desk| desk.model.requested.region;
+    desk.keys("Alt-r");
+    assert!(desk.notice().contains("Zoom in"), "{}", desk.notice());
+    desk.keys("Z Z Z");
+    let zoomed = window(&desk);
+    desk.keys("Alt-r Esc");
+    assert_eq!((region(&desk), desk.model.zoom), (Some(zoomed), None));
+    desk.keys("Alt-r");
+    assert_eq!(region(&desk), None);
+    let mut desk = rendered(8);
+    let (ball, hits) =
+        (Target::Object(0), desk.model.snapshot.as_ref().unwrap().first_hits.clone());
+    desk.select(ball);
+    desk.keys("Alt-r");
+    let Window { origin, size } = region(&desk).unwrap();
+    let hits = hits.unwrap();
+    let object = |x, y| hits.at_pixel([x, y]).unwrap().object;
+    assert!((origin[0]..origin[0] + size[0]).any(|x| object(x, origin[1]) == Some(0)));
+    assert!((0..240).all(|x| origin[1] < 4 || object(x, origin[1] - 4) != Some(0)));
+    assert_eq!(desk.model.outlined().len(), 2);
+}
+
 /// Renders the scene that opens by itself, with a film of fewer pixels, until it has `spp` samples per pixel.
 /// Returns the dashboard with the final snapshot.
 fn rendered(spp: u32) -> Desk {

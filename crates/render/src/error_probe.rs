@@ -181,7 +181,7 @@ impl Packet {
 }
 
 /// Returns the radiance of a sample under `weights`; black in invalid channels.
-fn radiance_of<L: SimdFloat>(
+pub(crate) fn radiance_of<L: SimdFloat>(
     radiance: &Radiance<L>,
     lane: usize,
     weights: &LightWeights,

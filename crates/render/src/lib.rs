@@ -6,6 +6,7 @@
 pub mod film;
 pub mod image_file;
 
+mod bounce_shares;
 mod checkpoint;
 mod error_parts;
 mod error_probe;
@@ -25,6 +26,7 @@ mod sync_render;
 mod threads;
 pub mod wave;
 
+pub use bounce_shares::BOUNCE_SHARES;
 pub use checkpoint::{Checkpoint, SampleInputs};
 pub use error_parts::{ErrorParts, ErrorTarget, ROUNDING_TO_8_BITS};
 pub use file_error::FileError;

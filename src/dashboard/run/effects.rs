@@ -92,6 +92,13 @@ impl EffectRunner {
             Effect::Stop(stop) => self.session.set_stop(stop),
             Effect::View(view) => self.session.set_view(view),
             Effect::Pin { step, is_pinned } => self.pin(step, is_pinned),
+            Effect::MeasureBounces(seconds) => {
+                let results = self.results.clone();
+                self.session.submit(move |picture| {
+                    let shares = picture.and_then(|picture| picture.bounce_shares(seconds));
+                    let _ = results.send(Message::Bounces(shares));
+                });
+            }
             Effect::Export(format) => {
                 self.export(move |exporter, picture| exporter.write(picture, format));
             }

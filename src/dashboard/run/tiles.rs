@@ -2,6 +2,8 @@
 //! are sent one after the other when no cells wait to be sent.
 
 use crate::dashboard::layout::PixelGrid;
+use crate::dashboard::marks::Mask;
+use crate::dashboard::view::marks;
 use crate::dashboard::{DisplayChannel, Model, Overlay};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
@@ -43,12 +45,18 @@ struct Sending {
     open: bool,
 }
 
+/// Picture of the session, and the masks of what is outlined in it.
+type Source = (Arc<Detail>, Vec<Mask>);
+
 #[derive(Debug, Default)]
 pub struct PanelTiles {
     grid: Option<(Protocol, PixelGrid)>,
     tiles: Vec<Tile>,
-    /// Picture whose differences determine `order`.
-    detail: Option<Arc<Detail>>,
+    source: Option<Source>,
+    /// Columns and rows of `pixels`.
+    size: [usize; 2],
+    /// Picture with outlines, whose differences from the screen determine `order`.
+    pixels: Vec<[u8; 3]>,
     /// RMS difference in levels up to which a tile is not sent again.
     least: f64,
     /// Tiles to send, the last one first.
@@ -76,8 +84,7 @@ impl PanelTiles {
             self.tiles = grid.map_or_else(Vec::new, |(protocol, grid)| tiles(protocol, grid));
         }
         let Some((.., detail)) = wanted else { return removal };
-        let mut changed = !self.detail.as_ref().is_some_and(|old| Arc::ptr_eq(old, &detail));
-        self.detail = Some(detail);
+        let mut changed = self.outline(model, detail);
         for (i, tile) in self.tiles.iter_mut().enumerate() {
             let (covered, holes) = covering(&tile.image, target, picture, uncovered);
             let is_kept = !covered && holes == tile.holes;
@@ -100,6 +107,22 @@ impl PanelTiles {
             self.sort();
         }
         removal
+    }
+
+    /// Sets the picture, with outlines. Returns `true` if it has changed.
+    fn outline(&mut self, model: &Model, detail: Arc<Detail>) -> bool {
+        let masks = model.outlined();
+        let is_same = |(old, outlined): &Source| Arc::ptr_eq(old, &detail) && *outlined == masks;
+        if self.source.as_ref().is_some_and(is_same) {
+            return false;
+        }
+        let mut outlined = Detail::clone(&detail);
+        for (mask, window) in &masks {
+            outlined.pixels = marks::outlined(&outlined, mask, *window);
+        }
+        (self.size, self.pixels) = (outlined.size, outlined.pixels);
+        self.source = Some((detail, masks));
+        true
     }
 
     /// Forgets all tiles. Returns the sequence that removes the visible ones.
@@ -165,13 +188,13 @@ impl PanelTiles {
 
     /// Returns the present pixels of a tile.
     fn pixels(&self, tile: &Tile) -> Vec<[u8; 3]> {
-        let (Some((_, grid)), Some(detail)) = (&self.grid, &self.detail) else { return Vec::new() };
+        let Some((_, grid)) = &self.grid else { return Vec::new() };
         let [x0, y0, width, height] = tile.px;
-        let [columns, rows] = detail.size;
+        let [columns, rows] = self.size;
         let pixel = |i: usize| {
             let (x, y) = (x0 + i % width, y0 + i / width);
             let (x, y) = (x.min(grid.size[0] - 1), y.min(grid.size[1] - 1));
-            detail.pixels[y * rows / grid.size[1] * columns + x * columns / grid.size[0]]
+            self.pixels[y * rows / grid.size[1] * columns + x * columns / grid.size[0]]
         };
         (0..width * height).map(pixel).collect()
     }

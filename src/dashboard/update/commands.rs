@@ -16,8 +16,10 @@ pub enum HintLine {
     First,
     /// No overlay is open, and keys are looked up in this context.
     In(KeyContext),
-    /// A list or a question is open.
+    /// A question or a list that typing does not search is open.
     List,
+    /// A list that typing searches is open.
+    Search,
     Form,
     Typing,
     /// A number or colour is being typed.
@@ -196,13 +198,14 @@ pub static COMMANDS: &[Command] = &[
     command("panels", "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Rotating, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).available(always).hints(&[
         hint(&[H::In(Moving), H::In(Rotating), H::In(Flying), H::In(Probing)], 9, "Esc", "done"),
         hint(&[H::In(Outline), H::In(Inspector)], 9, "Esc", "picture"),
-        hint(&[H::List, H::Form], 9, "Esc", "cancel"),
+        hint(&[H::List, H::Search, H::Form], 9, "Esc", "cancel"),
         hint(&[H::Typing, H::Number], 9, "Esc", "leave as it was"),
     ]),
     command("panels", "inspect, edit, confirm, choose", &[(Picture, "Enter"), (Outline, "Enter"), (Inspector, "Enter"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).hints(&[
         hint(&[H::In(Outline)], 2, "Enter", "inspect"),
         hint(&[H::In(Inspector)], 4, "Enter 0-9", "type"),
         hint(&[H::List], 2, "Enter", "take"),
+        hint(&[H::Search], 3, "Enter", "take"),
         hint(&[H::Form], 3, "Enter", "edit"),
         hint(&[H::Typing, H::Number], 1, "Enter", "confirm"),
         hint(&[H::Number], 2, "*2 /2 +.1 -=.1", "change it"),
@@ -213,7 +216,8 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::In(Outline)], 1, "Up Down", "select"),
         hint(&[H::In(Inspector), H::Form], 1, "Up Down", "field"),
         hint(&[H::Form], 5, "letters /", "find"),
-        hint(&[H::List], 1, "Up Down", "choose"),
+        hint(&[H::List, H::Search], 1, "Up Down", "choose"),
+        hint(&[H::Search], 2, "letters", "find"),
         hint(&[H::Watching], 2, "Up Down", "select"),
     ]),
     command("panels", "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).available(always),
@@ -227,6 +231,7 @@ pub static COMMANDS: &[Command] = &[
     command("panels", "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
     command("panels", "reset the field to its default", &[(Inspector, "Backspace Delete")], |c| c.fill_field("")).hints(&[hint(&[H::In(Inspector)], 6, "Backspace", "default")]),
     command("panels", "find a field or a part of the scene", &[(Anywhere, "/")], |c| c.find()).also("search").hints(&[hint(&[H::In(Outline), H::In(Inspector)], 5, "/", "find")]),
+    command("panels", "fold or unfold a group of fields", &[(Inspector, "Alt-f"), (Overlay, "Alt-f")], |c| c.fold_group()).also("hide material shape"),
     command("panels", "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).available(viewing),
 
     command("file", "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::In(Picture)], 9, "u", "undo")]),
@@ -279,8 +284,10 @@ pub static COMMANDS: &[Command] = &[
 
     command("rendering", "pause or resume", &[(Anywhere, "Space")], |c| c.pause()),
     command("rendering", "restart the picture", &[(Anywhere, "R")], |c| c.restart()),
+    command("rendering", "render only a region, or everything", &[(Anywhere, "Alt-r")], |c| c.toggle_region()).also("crop border window"),
     command("rendering", "stop at …", &[(Anywhere, "T")], |c| c.ask_stop()).also("samples rays spp time"),
     command("rendering", "noise targets and their times", &[(Anywhere, "N")], |c| c.open_noise_targets()).also("quality crisp samples rays"),
+    command("rendering", "measure the noise by bounce", &[(Anywhere, "Alt-n")], |c| c.measure_bounces()).also("why noisy cause share"),
     command("rendering", "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).also("settings").available(always),
 
     command("help", "find an action, field or part", &[(Anywhere, ": Ctrl-p")], |c| c.open_palette()).available(always).hints(&[

@@ -1,6 +1,6 @@
 //! Commands on the properties in the inspector and in forms.
 
-use crate::dashboard::panel_lines::{RowAct, walked};
+use crate::dashboard::panel_lines::{MATERIAL, RowAct, walked};
 use crate::dashboard::update::Coalesce;
 use crate::dashboard::{Editor, FieldLine, KeyContext, Overlay, PanelLine, UpdateContext};
 use zerkalo_scene::edit::{self, Edit, EditError, Widget, Word};
@@ -53,17 +53,17 @@ impl UpdateContext<'_> {
         self.row().filter(|row| row.act == RowAct::Edit)
     }
 
-    /// Moves the cursor of the inspector from the first line to the first one where letters run
-    /// commands, if there is one.
+    /// Moves the cursor of the inspector from the first line to the first one that Left and Right
+    /// step, if there is one.
     pub(super) fn skip_text(&mut self) {
         if self.model.context() != KeyContext::Inspector || self.model.inspector.cursor != 0 {
             return;
         }
-        let runs = |line: &PanelLine| {
+        let steps = |line: &PanelLine| {
             let widget = line.entry().map(|row| row.property.widget);
             matches!(widget, Some(Widget::Numbers | Widget::Switch))
         };
-        self.model.inspector.cursor = self.model.field_lines().iter().position(runs).unwrap_or(0);
+        self.model.inspector.cursor = self.model.field_lines().iter().position(steps).unwrap_or(0);
     }
 
     /// Confirms what is being typed, or carries out Enter on the row under the cursor. In a form, a
@@ -81,11 +81,23 @@ impl UpdateContext<'_> {
         match self.row().map(|row| row.act) {
             Some(RowAct::Edit) => self.open_field(),
             Some(RowAct::Add) => self.confirm_form(),
+            Some(RowAct::Unfold) => drop(self.model.folded.remove(MATERIAL)),
             Some(RowAct::Fold) => {
                 let list = self.model.field_list_mut();
                 list.unfolded = !list.unfolded;
             }
             None => {}
+        }
+    }
+
+    /// Folds or unfolds the group of the field under the cursor.
+    pub(super) fn fold_group(&mut self) {
+        let Some((group, first)) = self.model.field_group() else {
+            return self.say("This field has no group");
+        };
+        if !self.model.folded.remove(&group) {
+            self.model.folded.insert(group);
+            self.model.field_list_mut().cursor = first;
         }
     }
 
@@ -133,7 +145,11 @@ impl UpdateContext<'_> {
     /// the line is hidden. Returns `false` if there is no such line.
     pub(super) fn show_row(&mut self, is_wanted: impl Fn(&FieldLine) -> bool) -> bool {
         let folded = !self.model.field_list().unfolded;
+        let groups = self.model.folded.clone();
         for unfolded in [!folded, true] {
+            if unfolded {
+                self.model.folded.clear();
+            }
             self.model.field_list_mut().unfolded = unfolded;
             let lines = self.model.field_lines();
             let wanted = |line: &PanelLine| line.entry().is_some_and(|entry| is_wanted(entry));
@@ -143,6 +159,7 @@ impl UpdateContext<'_> {
             }
         }
         self.model.field_list_mut().unfolded = !folded;
+        self.model.folded = groups;
         false
     }
 

@@ -174,6 +174,7 @@ impl UpdateContext<'_> {
         let file = &mut self.model.file;
         (file.name, file.path, file.is_new) = (name, path, is_new);
         self.model.pictures = Pictures::default();
+        self.model.region = None;
         self.model.export_when_done = false;
         self.model.orphaned_edits = None;
         self.model.selection = Target::Camera;
@@ -191,16 +192,21 @@ impl UpdateContext<'_> {
         self.notify(Tone::Bad, format!("{text} The scene here stays as it is."), None);
     }
 
-    pub(super) fn changed_on_disk(&mut self) {
-        if !self.model.file.unreadable {
-            self.model.file.broken = None;
+    /// Removes the messages about errors in the file.
+    pub(super) fn mended_on_disk(&mut self) {
+        if !self.model.file.unreadable && self.model.file.broken.take().is_some() {
+            self.model.notice = None;
         }
+    }
+
+    pub(super) fn changed_on_disk(&mut self, difference: &str) {
+        self.mended_on_disk();
         let name = &self.model.file.name;
         if self.model.is_busy() {
             let text = format!("{name} has changed on disk · Ctrl-o reads it");
             self.notify(Tone::Plain, text, None);
         } else {
-            self.load(format!("{name} has changed on disk, and here are unsaved edits."));
+            self.load(format!("{name} has changed on disk{difference}. Here are unsaved edits."));
         }
     }
 

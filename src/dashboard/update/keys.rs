@@ -136,14 +136,8 @@ impl UpdateContext<'_> {
         let widget = self.field().map(|field| field.property.widget);
         let begins_number = "0123456789.-+*#".contains(c);
         match widget {
-            Some(Widget::Text) if c.is_alphanumeric() => self.type_value(c),
-            Some(Widget::Color) if c.is_alphabetic() => self.type_value(c),
-            Some(Widget::Choice | Widget::Kind | Widget::List)
-                if c.is_alphabetic() && !self.in_form() =>
-            {
-                self.open_field();
-                self.paste(&c.to_string());
-            }
+            Some(Widget::Text) if self.in_form() && c.is_alphanumeric() => self.type_value(c),
+            Some(Widget::Color) if self.in_form() && c.is_alphabetic() => self.type_value(c),
             _ if c == 'x' && !self.in_form() => {
                 self.say(
                     "x deletes in the outline and in the picture · Backspace sets the default",

@@ -1,9 +1,8 @@
 //! Mouse: clicks select or focus, drags orbit or move, the wheel dollies or scrolls.
 
 use crate::dashboard::marks::LightMark;
-use crate::dashboard::{
-    Drag, FieldList, Focus, Layout, Mode, OutlineLine, Overlay, PanelLine, UpdateContext,
-};
+use crate::dashboard::panel_lines::MATERIAL;
+use crate::dashboard::{Drag, FieldList, Focus, Layout, Mode, OutlineLine, Overlay, UpdateContext};
 use glam::DVec3;
 use ratatui::layout::Rect;
 use zerkalo_kernel::primitive::BoundingSphere;
@@ -54,7 +53,10 @@ impl UpdateContext<'_> {
             return;
         }
         let Some(layout) = self.model.layout() else { return };
-        if is_in(mouse, layout.picture) {
+        let border = layout.border_at(mouse.column, mouse.row);
+        if border.is_some() {
+            self.model.drag = Some(Drag { border, ..Drag::new(button, mouse) });
+        } else if is_in(mouse, layout.picture) {
             self.model.focus = Focus::Picture;
             if !self.moves_or_rotates() {
                 self.end_gesture();
@@ -168,7 +170,13 @@ impl UpdateContext<'_> {
         let on_number = pressed
             .is_some_and(|field| matches!(field.property.widget, Widget::Numbers | Widget::Color));
         self.model.drag = on_number.then(|| Drag { on_number, ..Drag::new(Button::Left, mouse) });
-        match line.filter(|line| lines.get(*line).and_then(PanelLine::entry).is_some()) {
+        if line.and_then(|line| lines.get(line)).is_some_and(|line| line.entry().is_none()) {
+            if self.apply_field() {
+                self.model.folded.insert(MATERIAL.to_string());
+            }
+            return;
+        }
+        match line.filter(|line| *line < lines.len()) {
             Some(line) if opens && line == cursor => self.open_row(),
             Some(line) if self.apply_field() => {
                 self.model.field_list_mut().cursor = line;
@@ -213,6 +221,9 @@ impl UpdateContext<'_> {
         drag.last = [mouse.column, mouse.row];
         drag.moved = true;
         let drag = *drag;
+        if let Some(border) = drag.border {
+            return self.model.move_border(border, [mouse.column, mouse.row]);
+        }
         if drag.on_number {
             // Each column is a fine step. Ten of them would be a coarse one.
             self.model.field_list_mut().editor = None;

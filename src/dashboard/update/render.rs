@@ -1,13 +1,17 @@
 //! Commands on rendering, exports and the colour depth of the terminal.
 
-use crate::dashboard::model::Colors;
+use crate::dashboard::model::{Colors, Tone};
 use crate::dashboard::update::cycled;
 use crate::dashboard::update::prompt::stop_text;
 use crate::dashboard::{Effect, Format, ListCursor, Overlay, UpdateContext};
 use std::sync::Arc;
+use zerkalo_render::BOUNCE_SHARES;
 use zerkalo_render::schedule::{Interval, Stop};
 use zerkalo_render::session::{QUALITIES, State};
 use zerkalo_scene::Scene;
+
+/// Time for which the noise by bounce is measured.
+const BOUNCE_SECONDS: f64 = 1.0;
 
 impl UpdateContext<'_> {
     pub(super) fn pause(&mut self) {
@@ -33,6 +37,20 @@ impl UpdateContext<'_> {
         let index = QUALITIES.iter().position(|levels| *levels <= wanted);
         let index = index.unwrap_or(QUALITIES.len() - 1);
         self.model.overlay = Some(Overlay::NoiseTargets(ListCursor { index, scroll: 0 }));
+    }
+
+    pub(super) fn measure_bounces(&mut self) {
+        self.emit(Effect::MeasureBounces(BOUNCE_SECONDS));
+        self.say("measuring the noise by bounce …");
+    }
+
+    pub(super) fn bounces(&mut self, shares: Option<[f64; BOUNCE_SHARES]>) {
+        let Some(shares) = shares else { return self.say("There is no noise") };
+        let names = ["seen directly", "1 bounce", "2 bounces", "more"];
+        let texts = names.iter().zip(shares).filter(|(_, share)| *share >= 0.005);
+        let texts: Vec<_> =
+            texts.map(|(name, share)| format!("{name} {:.0} %", 100.0 * share)).collect();
+        self.notify(Tone::Plain, format!("noise by bounce: {}", texts.join(" · ")), Some(15.0));
     }
 
     pub(super) fn export(&mut self, format: Format) {

@@ -121,6 +121,23 @@ impl UpdateContext<'_> {
         self.say(format!("loupe: {name}"));
     }
 
+    /// Limits the render to what is visible while zoomed, else to the selection, else to what the
+    /// loupe shows; or ends the limit.
+    pub(super) fn toggle_region(&mut self) {
+        let Some(layout) = self.model.layout() else { return };
+        if self.model.region.take().is_some() {
+            return self.say("the whole picture is rendered");
+        }
+        let zoomed = self.model.zoom.map(|_| layout.window);
+        let window = zoomed.or_else(|| self.model.selection_window());
+        let loupe = || self.model.loupe(&layout).map(|loupe| loupe.window);
+        self.model.region = window.or_else(loupe);
+        match self.model.region {
+            Some(_) => self.say("only this region is rendered, the rest stays · Alt-r: everything"),
+            None => self.refuse("Zoom in (Z) or select an object: that becomes the region"),
+        }
+    }
+
     /// Takes over what the terminal reports of itself, or the next protocol for the picture.
     pub(super) fn set_graphics(&mut self, terminal: Capabilities) {
         self.model.graphics = Graphics::new(terminal, self.model.graphics.mode);
@@ -146,14 +163,18 @@ impl UpdateContext<'_> {
         let view = View {
             raster: Some([0, 1].map(|i| layout.texels[i].min(layout.window.size[i]))),
             window: Some(layout.window),
+            // Outlines are smooth between the pixels of the mask.
+            hits: pixels.map(|(_, size)| size.map(|n| n.div_ceil(2))),
             detail: pixels.or(loupe).or(self.model.requested.detail.filter(|_| is_viewer)),
+            region: self.model.region,
             probe: self.model.probe,
         };
         let old = std::mem::replace(&mut self.model.requested, view);
         if old != view {
             self.emit(Effect::View(view));
         }
-        if (old.raster, old.window) != (view.raster, view.window) {
+        let shown = |view: &View| (view.raster, view.window, view.region);
+        if shown(&old) != shown(&view) {
             self.repaint();
         }
     }

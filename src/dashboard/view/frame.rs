@@ -6,6 +6,7 @@ use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::{DisplayChannel, Focus, Layout, Mode, Model};
 use ratatui::style::Modifier;
+use zerkalo_render::film::TILE;
 use zerkalo_scene::Tone;
 
 pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &mut Painter) {
@@ -76,6 +77,9 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
         Some(steps @ ..0) => chips.push((format!("zoom 1:{}", 1 << -steps), false)),
         Some(steps) => chips.push((format!("zoom {}:1", 1 << steps), false)),
     }
+    if let Some(noise) = region_noise(model) {
+        chips.push((format!("region {} levels · Alt-r ends it", number(noise)), true));
+    }
     if model.display.tone != Tone::Clip {
         chips.push((model.display.tone.name().to_string(), false));
     }
@@ -83,6 +87,20 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
         chips.push(("view, not the camera · H keeps it, h leaves it".to_string(), true));
     }
     chips
+}
+
+/// Returns the noise of the region that is rendered, in 8-bit levels.
+fn region_noise(model: &Model) -> Option<f64> {
+    let (region, tiles) = (model.region?, &model.snapshot.as_ref()?.tiles);
+    let ends = [0, 1].map(|i| (region.origin[i] + region.size[i]).div_ceil(TILE));
+    let rows = region.origin[1] / TILE..ends[1].min(tiles.rows);
+    let numbers = rows.flat_map(|y| {
+        (region.origin[0] / TILE..ends[0].min(tiles.columns)).map(move |x| y * tiles.columns + x)
+    });
+    let squares: Vec<_> = numbers
+        .filter_map(|tile| Some(f64::from(*tiles.noise_levels.get(tile)?).powi(2)))
+        .collect();
+    Some((squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt())
 }
 
 /// Describes the mode; `None` in the default mode.

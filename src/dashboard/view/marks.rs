@@ -3,41 +3,14 @@
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::{Layout, Model};
 use ratatui::style::Modifier;
+use zerkalo_render::film::{Detail, Window};
 use zerkalo_scene::edit::Target;
 use zerkalo_terminal::cells::{Oklab, Raster};
-use zerkalo_world::FirstHit;
 
 /// Colours of the outline. In each pixel, the first one is preferred.
 const OUTLINE: [[u8; 3]; 2] = [[255, 172, 60], [20, 20, 24]];
 /// Least difference in OKLab of the outline from the picture.
 const CONTRAST: f32 = 0.2;
-
-/// Returns a function that returns `true` if the first hit of a camera ray is on the selection.
-pub fn is_selected(model: &Model) -> impl Fn(&FirstHit) -> bool {
-    let all = match &model.selection {
-        Target::Part(i, _) => Target::Object(*i).solids(model.scene()),
-        _ => Vec::new(),
-    };
-    let own = model.selection.solids(model.scene());
-    let is_own = move |part: u32| all.get(part as usize).is_some_and(|solid| own.contains(solid));
-    move |hit| is_on(model, hit, &is_own)
-}
-
-fn is_on(model: &Model, hit: &FirstHit, is_own_part: impl Fn(u32) -> bool) -> bool {
-    let Some(index) = hit.object.map(|object| object as usize) else { return false };
-    match &model.selection {
-        Target::Object(selected) => *selected == index,
-        Target::Part(selected, _) => *selected == index && is_own_part(hit.part),
-        Target::Material(name) => {
-            model.scene().objects.get(index).is_some_and(|object| object.names_material(name))
-        }
-        Target::Camera
-        | Target::View(_)
-        | Target::Group(_)
-        | Target::Light(_)
-        | Target::Settings(_) => false,
-    }
-}
 
 /// Draws a line around the part of the picture in which `mask` is white.
 pub fn outline(raster: &mut Raster, mask: &Raster) {
@@ -52,6 +25,32 @@ pub fn outline(raster: &mut Raster, mask: &Raster) {
             raster.pixels[i] = OUTLINE.into_iter().find(shows).unwrap_or(OUTLINE[0]);
         }
     }
+}
+
+/// Returns the pixels of `detail` with a line around the part in which `mask`, an image of `window`
+/// of the film, is white. The line is smooth between the pixels of the mask.
+pub fn outlined(detail: &Detail, mask: &Raster, window: Window) -> Vec<[u8; 3]> {
+    let (of, [width, height]) = (detail.window, detail.size);
+    let most = [mask.width, mask.height].map(|n| n.saturating_sub(1));
+    // Position in the mask: the pixel before it along `axis`, the one after, and the share of that.
+    let between = |axis: usize, at: usize| {
+        let film = of.origin[axis] as f64
+            + (at as f64 + 0.5) * of.size[axis] as f64 / detail.size[axis] as f64;
+        let share = (film - window.origin[axis] as f64) / window.size[axis] as f64;
+        let at = (share * (most[axis] + 1) as f64 - 0.5).clamp(0.0, most[axis] as f64);
+        (at as usize, (at as usize + 1).min(most[axis]), at.fract())
+    };
+    let white = |x: usize, y: usize| f64::from(mask.pixels[y * mask.width + x][0]);
+    let columns: Vec<_> = (0..width).map(|x| between(0, x)).collect();
+    let rows: Vec<_> = (0..height).map(|y| between(1, y)).collect();
+    let mask = Raster::from_fn(width, height, |i| {
+        let ((left, right, x), (top, low, y)) = (columns[i % width], rows[i / width]);
+        let across = |row| white(left, row) * (1.0 - x) + white(right, row) * x;
+        [if across(top) * (1.0 - y) + across(low) * y > 127.0 { 255 } else { 0 }; 3]
+    });
+    let mut raster = Raster { width, height, pixels: detail.pixels.clone() };
+    outline(&mut raster, &mask);
+    raster.pixels
 }
 
 /// Draws the marks of the lights.
@@ -94,5 +93,13 @@ mod tests {
         let changed: Vec<_> = (0..20).filter(|i| raster.pixels[*i] != before.pixels[*i]).collect();
         assert_eq!(changed, [2, 6, 8, 11, 13, 17]);
         assert_eq!([raster.pixels[2], raster.pixels[17]], [OUTLINE[1], OUTLINE[0]]);
+        // Around a mask of 2 x 2 pixels, of which one is white, the corner is cut.
+        let window = Window::whole([16, 16]);
+        let detail =
+            Detail { window, size: [16, 16], pixels: vec![[30; 3]; 256], ..Detail::default() };
+        let mask = Raster::from_fn(2, 2, |i| if i == 0 { [255; 3] } else { [0; 3] });
+        let pixels = outlined(&detail, &mask, window);
+        let edge = |y: usize| (0..16).find(|x| pixels[16 * y + x] == OUTLINE[0]);
+        assert_eq!([0, 3, 6, 7].map(edge), [Some(8), Some(8), Some(6), Some(5)]);
     }
 }

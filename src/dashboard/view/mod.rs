@@ -8,7 +8,7 @@ mod histogram;
 mod image_viewer;
 mod legend;
 mod loupe;
-mod marks;
+pub mod marks;
 mod message_view;
 mod outline;
 mod overlay;

@@ -48,7 +48,7 @@ pub fn is_settled(model: &Model) -> bool {
 }
 
 impl PictureView {
-    /// Returns the selected channel in the texels of `layout`, with the outline of the selection. Returns
+    /// Returns the selected channel in the texels of `layout`, with outlines. Returns
     /// `None` if the channel's data are missing.
     pub fn raster(&mut self, model: &Model, layout: &Layout) -> Option<Raster> {
         let size = (layout.texels, layout.window);
@@ -56,12 +56,8 @@ impl PictureView {
         let snapshot = model.snapshot.as_deref().filter(|_| model.histogram);
         let live = snapshot.and_then(|snapshot| beauty(model, snapshot, size));
         self.histogram = live.map(|live| Histogram::of(&live));
-        let white_if = |inside: bool| [if inside { 255 } else { 0 }; 3];
-        let is_selected = marks::is_selected(model);
-        let mask = |s| hit_colors(s, size, |hit| white_if(is_selected(hit)));
-        if let Some(mask) = model.snapshot.as_deref().filter(|_| model.shows_marks()).and_then(mask)
-        {
-            marks::outline(&mut raster, &mask);
+        for (mask, window) in model.outlined() {
+            marks::outline(&mut raster, &resized(mask, window, size));
         }
         Some(raster)
     }

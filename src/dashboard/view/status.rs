@@ -143,6 +143,9 @@ fn state(model: &Model, report: &Report, theme: &Theme) -> (String, Style) {
         }
         State::Finished(StoppedBy::Spp) => ("✓ samples reached", theme.good()),
         State::Finished(StoppedBy::Time) => ("✓ time over", theme.good()),
+        State::Finished(StoppedBy::RaysPerPixel) if model.region.is_some() => {
+            ("✓ region converged", theme.good())
+        }
         State::Finished(StoppedBy::RaysPerPixel) => ("✓ rays per pixel reached", theme.good()),
         State::Finished(StoppedBy::Full) => ("✓ no more samples fit", theme.good()),
     };

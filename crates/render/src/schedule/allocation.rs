@@ -192,9 +192,11 @@ impl Schedule {
             }
         }
 
-        let over_picture = |rmse: f64| rmse * rmse * self.pixels() as f64;
+        let active = self.tiles.iter().filter(|tile| !tile.rests);
+        let pixels: f64 = active.map(|tile| f64::from(tile.pixels)).sum();
+        let over_picture = |rmse: f64| rmse * rmse * pixels;
         let noise = self.largest_recent_noise();
-        let mut error = over_picture(noise.map_or(0.0, |noise| criterion.of(noise.rmse)));
+        let mut error = over_picture(noise.map_or(0.0, |noise| self.error_to_lower(noise)));
         let target = self.target().filter(|(c, _)| *c == criterion);
         let enough = target.map_or(-1.0, |(_, target)| over_picture(target));
         let mut heap: BinaryHeap<Candidate> =

@@ -202,7 +202,32 @@ impl Schedule {
     fn update_noise(&mut self) {
         self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error));
         if let Some(noise) = self.noise {
-            self.convergence.record(self.rays as f64, self.settings.criterion.of(noise.rmse));
+            let error = self.error_to_lower(noise);
+            self.convergence.record(self.rays as f64, error);
+        }
+    }
+
+    /// Returns the error that samples lower: that of the tiles which do not rest if others do, or else
+    /// `noise`, that of the picture.
+    fn error_to_lower(&self, noise: Noise) -> f64 {
+        let criterion = self.settings.criterion;
+        match self.tiles.iter().any(|tile| tile.rests) {
+            true => self.pooled(criterion, |tile| !tile.rests),
+            false => criterion.of(noise.rmse),
+        }
+    }
+
+    /// Sets which tiles, by number, rest: they get only the samples that the first noise estimate
+    /// needs. The render ends when the error of the others meets the target.
+    pub fn set_resting(&mut self, rests: impl Fn(usize) -> bool) {
+        let mut has_changed = false;
+        for (number, tile) in self.tiles.iter_mut().enumerate() {
+            let before = std::mem::replace(&mut tile.rests, rests(number));
+            has_changed |= before != tile.rests;
+        }
+        if has_changed {
+            self.interrupted = None;
+            self.convergence = ConvergenceFit::default();
         }
     }
 
@@ -231,9 +256,10 @@ impl Schedule {
 
     /// Returns the cap of `tile`: its largest number of samples per pixel and replicate. For glossy
     /// tiles it is half of [`Settings::rays_per_pixel`], at least 1. For other tiles, and if that
-    /// setting is 0, it is [`MAX_SAMPLES`].
+    /// setting is 0, it is [`MAX_SAMPLES`]. Tiles that rest keep their samples.
     fn cap(&self, tile: &Tile) -> u32 {
         match self.settings.rays_per_pixel {
+            _ if tile.rests => tile.done.max(self.min_samples()),
             0 => MAX_SAMPLES,
             _ if !tile.glossy => MAX_SAMPLES,
             cap => (cap / 2).clamp(1, MAX_SAMPLES),

@@ -77,14 +77,15 @@ impl Schedule {
     pub(super) fn reason_to_stop(&self, seconds: f64) -> Option<StoppedBy> {
         let stop = &self.settings.stop;
         if let Some(noise) = self.largest_recent_noise().filter(|_| self.has_enough_samples()) {
-            if stop.noise_levels.is_some_and(|t| noise.rmse.levels <= t) {
+            let is_whole = !self.tiles.iter().any(|tile| tile.rests);
+            if is_whole && stop.noise_levels.is_some_and(|t| noise.rmse.levels <= t) {
                 return Some(StoppedBy::Noise);
             }
-            if stop.rmse_linear.is_some_and(|t| noise.rmse.linear <= t) {
+            if is_whole && stop.rmse_linear.is_some_and(|t| noise.rmse.linear <= t) {
                 return Some(StoppedBy::Rmse);
             }
             let is_met = |error| noise.rmse.levels <= self.noise_target(error);
-            if self.is_probed() && stop.error.is_some_and(is_met) {
+            if is_whole && self.is_probed() && stop.error.is_some_and(is_met) {
                 return Some(StoppedBy::Error);
             }
             if self.capped_at_target() {

@@ -16,6 +16,8 @@ pub(super) struct Tile {
     pub rays: u64,
     /// `true` if a path in the tile has made a random choice.
     pub glossy: bool,
+    /// `true` if the tile gets only the samples that the first noise estimate needs.
+    pub rests: bool,
     /// Latest noise estimate.
     pub error: Option<TileNoise>,
     /// Noise estimates from which the slope is fitted, oldest first. From one estimate to the next

@@ -1,7 +1,7 @@
 //! Active render of a session: traces one scene in pieces of a fraction of a second.
 
 use crate::checkpoint::{Checkpoint, seconds_of};
-use crate::film::Film;
+use crate::film::{Film, TILE, Window};
 use crate::first_hit_buffer::FirstHitBuffer;
 use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
 use crate::session::Shared;
@@ -274,10 +274,21 @@ impl ActiveRender {
         wave.cut((speed * seconds) as u64, longest.max(SAMPLE_ALIGNMENT))
     }
 
+    /// Gives samples only to the tiles of `region`, or to all without one.
+    pub fn set_region(&mut self, region: Option<Window>) {
+        let columns = self.state.film.tile_columns();
+        let is_in = |Window { origin, size }: Window, tile: usize| {
+            let start = [tile % columns * TILE, tile / columns * TILE];
+            (0..2).all(|i| start[i] < origin[i] + size[i] && start[i] + TILE > origin[i])
+        };
+        self.schedule.set_resting(|tile| region.is_some_and(|region| !is_in(region, tile)));
+    }
+
     /// Traces the first-hit buffer that the client has requested, unless it exists already or is
     /// expected to take longer than `limit` seconds.
     fn update_first_hits(&mut self, context: &WorkContext, limit: f64) {
-        let Some([columns, rows]) = context.view.raster else { return };
+        let View { raster, hits, .. } = context.view;
+        let Some([columns, rows]) = hits.or(raster) else { return };
         let RenderState { world, film, .. } = &self.state;
         let window = context.view.window_of([film.header.width, film.header.height]);
         let wanted = (window, [columns, rows]);

@@ -2,10 +2,10 @@
 
 use crate::export::{Provenance, film_header};
 use crate::film::file::{EncodedFilm, FilmFileHeader};
-use crate::film::{Film, LightWeights};
+use crate::film::{Film, LightWeights, TileNoise};
 use crate::session::active_render::ActiveRender;
 use crate::session::report::Report;
-use crate::{RenderState, checkpoint};
+use crate::{BOUNCE_SHARES, RenderState, checkpoint};
 use zerkalo_scene::Scene;
 
 /// Film of a session with its report.
@@ -42,6 +42,20 @@ impl<'a> Picture<'a> {
             Source::Render(render, _) => Some(&render.state),
             Source::Files(_) => None,
         }
+    }
+
+    /// Traces the noisiest tiles for about `seconds`. Returns the shares in their noise of paths
+    /// without a bounce, with one, with two, and with more. Returns `None` without noise, and if the
+    /// session watches films.
+    pub fn bounce_shares(&self, seconds: f64) -> Option<[f64; BOUNCE_SHARES]> {
+        let Source::Render(render, pool) = self.source else { return None };
+        let noise = |estimate: Option<TileNoise>| {
+            estimate.map_or(0.0, |noise| noise.of_all().levels * f64::from(noise.pixels))
+        };
+        let noise: Vec<_> = render.schedule.tile_estimates().map(noise).collect();
+        let mut tiles: Vec<_> = (0..noise.len()).filter(|tile| noise[*tile] > 0.0).collect();
+        tiles.sort_by(|a, b| noise[*b].total_cmp(&noise[*a]));
+        render.state.bounce_shares(&tiles, seconds, pool)
     }
 
     /// Encodes the render as a checkpoint. Returns `None` before the first picture, or if the

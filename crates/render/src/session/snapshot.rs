@@ -19,10 +19,14 @@ pub struct View {
     /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::first_hits`]. `None` requests
     /// neither of them, nor [`Snapshot::tiles`].
     pub raster: Option<[usize; 2]>,
+    /// Columns and rows of the first hits if they differ from those of the picture.
+    pub hits: Option<[usize; 2]>,
     /// Window of the film that the picture and the first hits show; `None` for the whole film.
     pub window: Option<Window>,
     /// Window of [`Snapshot::detail`], and its columns and rows.
     pub detail: Option<(Window, [usize; 2])>,
+    /// Window of the film whose tiles get samples, after the first noise estimate; `None` for all.
+    pub region: Option<Window>,
     /// Column and row of the pixel whose samples and error are requested.
     pub probe: Option<[usize; 2]>,
 }

@@ -215,6 +215,7 @@ impl Worker {
                 return;
             }
         };
+        work.set_region(context.view.region);
         // The first picture of a scene is traced even during a pause.
         let paused = self.paused && work.first_picture_after.is_some();
         if work.estimates_stale {

@@ -2,7 +2,7 @@
 
 use crate::edit::add::object_kinds;
 use crate::edit::properties::Word;
-use crate::edit::unique_name::free_object;
+use crate::edit::unique_name::{free_name, free_object};
 use crate::edit::{Edit, EditError, Target};
 use crate::material::Material;
 use crate::shape::{CsgOperand, Shape, compose, unfit_reason};
@@ -270,7 +270,11 @@ pub(super) fn remove_part(scene: &mut Scene, part: &Target) -> Option<Target> {
 pub(super) fn copy_part(scene: &mut Scene, part: &Target) -> Option<Target> {
     let Target::Part(i, path) = part else { return None };
     let (at, outer) = path.split_last()?;
-    let copy = operand(scene, *i, path)?.clone();
-    siblings(scene, *i, path)?.insert(at + 1, copy);
+    let mut copy = operand(scene, *i, path)?.clone();
+    let parts = siblings(scene, *i, path)?;
+    if !copy.name.is_empty() {
+        copy.name = free_name(&copy.name, |name| parts.iter().any(|part| part.name == name));
+    }
+    parts.insert(at + 1, copy);
     Some(Target::Part(*i, [outer, &[at + 1]].concat()))
 }

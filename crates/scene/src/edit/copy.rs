@@ -277,6 +277,12 @@ mod tests {
         let (a, b) = (old.form().bounds().unwrap(), new.form().bounds().unwrap());
         assert!(!(a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()), "{a:?} {b:?}");
         assert_eq!(a.0.y, b.0.y);
+        let mut unnamed = scene.clone();
+        unnamed.objects[1].name.clear();
+        unnamed.objects[2].name = "rectangle".into();
+        let copy = duplicate(&unnamed, &Target::Object(2)).unwrap().scene;
+        assert_eq!(Target::Object(1).label(&copy), "rectangle 2");
+        assert_eq!(Target::Object(6).label(&copy), "rectangle 3");
         let lamp = duplicate(&scene, &Target::Light(0)).unwrap().scene;
         assert_eq!(lamp.lights[1].name, "lamp 2");
         assert_ne!(lamp.lights[1].kind, lamp.lights[0].kind);

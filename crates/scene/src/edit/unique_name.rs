@@ -1,6 +1,7 @@
 //! Unique names for new objects, lights, materials and cameras.
 
 use crate::Scene;
+use crate::edit::Target;
 
 /// Returns `wanted` if this name is free. If not, returns it with the smallest number from 2 that
 /// makes it free: `cube 2`. A number at the end of `wanted` is replaced.
@@ -17,8 +18,13 @@ pub(super) fn free_name(wanted: &str, taken: impl Fn(&str) -> bool) -> String {
     (2u32..).map(|n| format!("{stem} {n}")).find(|name| !taken(name)).unwrap_or(stem)
 }
 
+/// Returns a name that no object has, and that none without a name shows.
 pub(super) fn free_object(scene: &Scene, wanted: &str) -> String {
-    free_name(wanted, |name| scene.objects.iter().any(|o| o.name == name))
+    let shows = |i: usize, own: &str, name: &str| match own {
+        "" => Target::Object(i).label(scene) == name,
+        own => own == name,
+    };
+    free_name(wanted, |name| (0..).zip(&scene.objects).any(|(i, o)| shows(i, &o.name, name)))
 }
 
 pub(super) fn free_light(scene: &Scene, wanted: &str) -> String {

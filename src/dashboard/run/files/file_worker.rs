@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_scene::disk::FileStamp;
+use zerkalo_scene::value::truncated;
 use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 
 /// Interval between checks for changes by other programs.
@@ -114,7 +115,7 @@ impl FileWorker {
         }
         self.seen = now;
         let Some(file) = &self.file else {
-            return now.map(|_| Message::ChangedOnDisk);
+            return now.map(|_| Message::ChangedOnDisk(String::new()));
         };
         let was_broken = std::mem::take(&mut self.is_broken);
         if file.on_disk() != DiskState::Changed {
@@ -122,7 +123,10 @@ impl FileWorker {
         }
         let assets = file.document.scene().resolver.assets.clone();
         match SceneFile::open_with(path, assets) {
-            Ok(_) => Some(Message::ChangedOnDisk),
+            Ok(new) => {
+                let texts = [file.document.text(), new.document.text()];
+                Some(Message::ChangedOnDisk(difference(texts)))
+            }
             Err(errors) => {
                 self.is_broken = true;
                 Some(Message::BrokenOnDisk(errors))
@@ -210,5 +214,14 @@ impl FileWorker {
         let scene = file.document.shared_scene();
         self.shared.put(file);
         Ok(scene)
+    }
+}
+
+/// Describes the first line in which the second text differs from the first.
+fn difference([old, new]: [&str; 2]) -> String {
+    let same = old.lines().zip(new.lines()).take_while(|(old, new)| old == new).count();
+    match new.lines().nth(same) {
+        Some(line) => format!(": line {} is now `{}`", same + 1, truncated(line.trim())),
+        None => format!(": it ends after line {same}"),
     }
 }

@@ -220,7 +220,9 @@ mod tests {
         for comment in ["# more", "# else"] {
             fs::write(&other, format!("{STARTER}\n{comment}\n")).unwrap();
             fs::rename(&other, &path).unwrap();
-            assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
+            let message = inbox.recv_timeout(PATIENCE).unwrap();
+            let Message::ChangedOnDisk(difference) = message else { panic!("{message:?}") };
+            assert!(difference.contains("is now `"), "{difference}");
         }
         let quiet = inbox.recv_timeout(CHECK_INTERVAL + CHECK_INTERVAL / 2);
         assert!(quiet.is_err(), "reported once: {quiet:?}");
@@ -243,7 +245,7 @@ mod tests {
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::Saved(_, Err(_))));
         assert_eq!(fs::read_to_string(&path).unwrap(), "[camera", "not ours to overwrite");
         fs::write(&path, STARTER).unwrap();
-        assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
+        assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk(_)));
         files.give(Job::Load);
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
         assert!(files.shared.get().is_some());

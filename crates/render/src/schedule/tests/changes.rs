@@ -128,6 +128,28 @@ fn cap_may_rise_and_fall() {
     assert_eq!((schedule.spp().min, schedule.spp().max), (100, 100));
 }
 
+#[test]
+fn tiles_outside_of_a_region_rest_until_it_ends() {
+    let mut model = Model::exact(vec![NOISY; 100]);
+    let mut schedule = model.schedule(until(noise(1.0), true));
+    schedule.set_resting(|tile| tile >= 30);
+    let end = finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES);
+    assert_eq!(end, StoppedBy::RaysPerPixel);
+    let (inside, outside) = schedule.tiles.split_at(30);
+    assert!(outside.iter().all(|tile| tile.done == MIN_SAMPLES));
+    assert!(inside.iter().all(|tile| (600..1200).contains(&tile.done)), "sigma 40: to 1 level");
+    assert!(schedule.noise.unwrap().rmse.levels > 10.0, "the noise is that of the whole picture");
+    schedule.set_resting(|_| false);
+    let end = finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES);
+    assert_eq!((end, schedule.noise.unwrap().rmse.levels <= 1.0), (StoppedBy::Noise, true));
+    // A region goes on where the whole picture has converged.
+    schedule.set_resting(|tile| tile != 7);
+    schedule.tiles[7].error.iter_mut().for_each(|error| error.reported.levels *= 16.0);
+    let before = schedule.tiles[7].done;
+    finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES);
+    assert!(schedule.tiles[7].done > before && schedule.tiles[8].done < 2 * before);
+}
+
 /// Checks that a render to a mean number of samples, which is saved and resumed to more samples,
 /// gives every tile as many samples as a render without interruption.
 #[test]
