@@ -23,6 +23,7 @@ mod lobes;
 mod mesh_scenes;
 mod random_scenes;
 mod reference;
+mod roughness_mix;
 mod scenes;
 mod serving;
 mod shards;

@@ -36,6 +36,7 @@ pub fn report(generation: u64, spp: u64, noise_levels: Option<f64>) -> Report {
         error: None,
         probe_seconds: [0.0; 2],
         rounding_avoided: None,
+        mixed: false,
         eta_seconds: None,
         quality_seconds: [None; QUALITIES.len()],
         progress: None,

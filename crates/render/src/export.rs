@@ -89,6 +89,8 @@ fn display_text(display: &Display) -> String {
 
 /// Key of the metadata entry with sampler, precision, sample allocation and display transform.
 const SETTINGS: &str = "Settings";
+/// Key of the metadata entry of a picture that contains samples of another roughness.
+const MIXED: &str = "Roughness mix";
 /// Text that precedes the display transform in the value of [`SETTINGS`].
 const DISPLAY: &str = ", exposure ";
 
@@ -108,6 +110,7 @@ fn film_entries(report: &Report) -> impl Iterator<Item = (&'static str, String)>
     [("Samples per pixel", format!("{:.2} ({}-{})", spp.mean, spp.min, spp.max)), ("Noise", noise)]
         .into_iter()
         .chain(error.map(|error| ("Error", error.to_string())))
+        .chain(report.mixed.then(|| (MIXED, "samples of a smaller roughness are included".into())))
         .chain([
             ("Bad samples", report.bad_samples.to_string()),
             ("Saturated samples", report.saturated_samples.to_string()),

@@ -20,6 +20,7 @@ pub mod plan;
 mod region_render;
 mod relighting;
 mod render_state;
+mod roughness_mix;
 pub mod schedule;
 pub mod session;
 mod sync_render;

@@ -52,26 +52,36 @@ pub fn run_typed<L: SimdFloat>(
     estimator: &Estimator,
     context: PassContext,
 ) -> WaveReport {
-    let PassContext { pool, cancel, .. } = context;
     let renderer = TileRenderer::new(world, &context);
-    let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
-    let slots = film.slots(&tiles);
-    let trace = |(slot, job): (TileHandle, &Job)| {
-        if cancel.load(Ordering::Relaxed) {
-            return None;
-        }
-        let origin = slot.origin;
-        let tile = slot.prepare();
-        let counts = renderer.job(tile, origin, wave.replicate, job);
+    renderer.jobs(film, (wave.replicate, &wave.jobs), context, |tile, counts| {
         let error = if wave.estimate { estimator.tile(tile) } else { None };
-        Some(JobReport { rays: counts.rays, glossy: counts.glossy, error })
-    };
-    // If the pool has one thread and the wave one job, the calling thread traces the job. This
-    // avoids a switch of threads.
-    if pool.current_num_threads() == 1 && slots.len() == 1 {
-        slots.into_iter().zip(&wave.jobs).map(trace).collect()
-    } else {
-        pool.install(|| slots.into_par_iter().zip(&wave.jobs).with_max_len(1).map(trace).collect())
+        JobReport { rays: counts.rays, glossy: counts.glossy, error }
+    })
+}
+
+/// Traces the samples of `jobs` in `replicate` and adds them to `film`, multiplied by `factor`.
+/// Returns the work of each job; `None` if it was cancelled.
+pub(super) fn run_scaled(
+    world: &AnyWorld,
+    film: &mut Film,
+    jobs: (usize, &[Job]),
+    factor: f64,
+    context: PassContext,
+) -> Vec<Option<Counts>> {
+    fn typed<L: SimdFloat>(
+        world: &World<L>,
+        film: &mut Film,
+        jobs: (usize, &[Job]),
+        factor: f64,
+        context: PassContext,
+    ) -> Vec<Option<Counts>> {
+        let mut renderer = TileRenderer::new(world, &context);
+        renderer.scales.iter_mut().for_each(|scale| *scale *= factor);
+        renderer.jobs(film, jobs, context, |_, counts| counts)
+    }
+    match world {
+        AnyWorld::Single(world) => typed(world, film, jobs, factor, context),
+        AnyWorld::Double(world) => typed(world, film, jobs, factor, context),
     }
 }
 
@@ -79,7 +89,7 @@ pub fn run_typed<L: SimdFloat>(
 pub(super) struct TileRenderer<'a, L: SimdFloat> {
     pub(super) tracer: CameraTracer<'a, L>,
     /// Scale of each light group: integer steps of the film per unit of radiance.
-    scales: &'a [f64],
+    scales: Vec<f64>,
     /// Largest radiance of one sample that the film can hold, for each light group: 2^49 steps.
     limits: [L; MAX_GROUPS],
     /// Result of [`pixels_of`] for a tile that is entirely inside the picture.
@@ -106,10 +116,39 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
         Self {
             tracer: world.camera_tracer(context.sampling),
-            scales: &world.info.scales,
+            scales: world.info.scales.clone(),
             limits,
             whole_tile: pixels_of([TILE; 2]),
             divides: context.pool.current_num_threads() > 1,
+        }
+    }
+
+    /// Traces `jobs` of one replicate, each for one tile of `film`. Returns what `report` makes of the
+    /// tile and the work of each job; `None` if it was cancelled.
+    fn jobs<R: Send>(
+        &self,
+        film: &mut Film,
+        (replicate, jobs): (usize, &[Job]),
+        PassContext { pool, cancel, .. }: PassContext,
+        report: impl Fn(&Tile, Counts) -> R + Sync,
+    ) -> Vec<Option<R>> {
+        let tiles: Vec<usize> = jobs.iter().map(|job| job.tile as usize).collect();
+        let slots = film.slots(&tiles);
+        let trace = |(slot, job): (TileHandle, &Job)| {
+            if cancel.load(Ordering::Relaxed) {
+                return None;
+            }
+            let origin = slot.origin;
+            let tile = slot.prepare();
+            let counts = self.job(tile, origin, replicate, job);
+            Some(report(tile, counts))
+        };
+        // If the pool has one thread and there is one job, the calling thread traces the job. This
+        // avoids a switch of threads.
+        if pool.current_num_threads() == 1 && slots.len() == 1 {
+            slots.into_iter().zip(jobs).map(trace).collect()
+        } else {
+            pool.install(|| slots.into_par_iter().zip(jobs).with_max_len(1).map(trace).collect())
         }
     }
 
@@ -161,7 +200,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
             }
             None => self.trace(tile, site, second),
         };
-        Counts { rays: counts.rays + others.rays, glossy: counts.glossy | others.glossy }
+        counts.and(others)
     }
 
     /// Traces the samples of `pixels` and adds them to `tile`. A packet holds `WIDTH` samples of

@@ -4,6 +4,7 @@ use crate::error_probe::ErrorProbe;
 use crate::film::{Display, Estimator, Film, Header, LightWeights, TILE};
 use crate::pass::PassContext;
 use crate::relighting::Relighting;
+use crate::roughness_mix::RoughnessMix;
 use crate::schedule::{Measurable, Schedule, Settings};
 use crate::wave::{Wave, WaveReport};
 use crate::{first_pass, memory_budget, pass};
@@ -46,6 +47,8 @@ pub struct RenderState {
     pub(super) probe: Option<Box<ErrorProbe>>,
     /// Value of [`world::Options::merge_lights`].
     pub(super) merge_lights: bool,
+    /// Picture of a smaller roughness, whose samples this render reuses.
+    pub(super) mix: Option<Box<RoughnessMix>>,
 }
 
 impl RenderState {
@@ -127,6 +130,7 @@ impl RenderState {
             estimator,
             probe: None,
             merge_lights: options.world.merge_lights,
+            mix: None,
         })
     }
 
@@ -223,6 +227,11 @@ impl RenderState {
         pool: &rayon::ThreadPool,
         cancel_wave: &AtomicBool,
     ) -> WaveReport {
+        if let Some(mut mix) = self.mix.take() {
+            let report = mix.trace_wave(self, wave, pool, cancel_wave);
+            self.mix = Some(mix);
+            return report;
+        }
         let Self { world, film, sampling, estimator, .. } = self;
         pass::run(world, film, wave, estimator, PassContext { sampling, pool, cancel: cancel_wave })
     }

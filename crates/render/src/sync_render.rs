@@ -37,6 +37,14 @@ impl SyncRender {
         Ok(Self { state, schedule, pool, seconds: 0.0, cancel: Arc::default() })
     }
 
+    /// Shows `scene` with the samples of this render, as `RenderState::turn` does. Returns `None` if
+    /// `scene` needs other samples.
+    pub fn turn(self, scene: &Scene, options: &Options) -> Option<Self> {
+        let turned = self.state.turn(&Arc::new(scene.clone()), options, self.schedule).ok();
+        let (state, schedule) = turned?;
+        Some(Self { state, schedule, seconds: 0.0, ..self })
+    }
+
     /// Traces the next round. Returns the stop criterion that ended the render, or `None` if it
     /// continues.
     pub fn step(&mut self) -> Option<StoppedBy> {
@@ -49,6 +57,9 @@ impl SyncRender {
             let report = self.state.trace_wave(&wave, &self.pool, &self.cancel);
             self.seconds += start.elapsed().as_secs_f64();
             self.schedule.complete(&wave, &report);
+            if let Some(mix) = &self.state.mix {
+                mix.continue_tiles(&wave, &mut self.schedule);
+            }
             if let Some(packets) = self.schedule.due_probe() {
                 let sums = self.state.probe_errors(packets, &self.pool, &self.cancel);
                 sums.iter().for_each(|sums| self.schedule.record_probe(sums));

@@ -89,6 +89,26 @@ impl AnyWorld {
         }
     }
 
+    /// Divides the lobe of the material that is rougher than in the world `inner`, compiled from an
+    /// otherwise equal scene. Returns the share of the narrower lobe in it; `None` if lobes of this
+    /// kind or these paths cannot be divided.
+    pub fn turn(&mut self, inner: &Self) -> Option<f64> {
+        match (self, inner) {
+            (Self::Single(world), Self::Single(inner)) => world.turn(inner),
+            (Self::Double(world), Self::Double(inner)) => world.turn(inner),
+            (Self::Single(_), Self::Double(_)) | (Self::Double(_), Self::Single(_)) => None,
+        }
+    }
+
+    /// Sets the order of the samples that are traced next; 0 for samples of the whole lobe.
+    pub fn set_order(&mut self, order: usize) {
+        let turned = match self {
+            Self::Single(world) => &mut world.turned,
+            Self::Double(world) => &mut world.turned,
+        };
+        turned.iter_mut().for_each(|turned| turned.order = order);
+    }
+
     /// Writes the first hit of the camera ray through each of `points`, positions in the picture
     /// \[pixels\], into `hits`, a slice of the same length.
     pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {

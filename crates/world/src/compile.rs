@@ -537,6 +537,7 @@ impl<L: SimdFloat> World<L> {
             outside_only,
             bsdf_of,
             bsdfs: materials.bsdfs,
+            turned: None,
             ambient: groups.find(&LightGroupSource::Ambient),
             background: groups.find(&LightGroupSource::Background).filter(|_| has_background),
             info: WorldInfo {

@@ -14,7 +14,7 @@ mod world;
 pub use any_world::{AnyWorld, Options, Precision, requires_double};
 pub use integrator::KERNELS;
 pub use integrator::first_hit::FirstHit;
-pub use integrator::path::{Counts, Path, Radiance};
+pub use integrator::path::{Counts, MAX_ORDER, Path, Radiance};
 pub use lights::groups::{LightGroupSource, LightGroups, MAX_GROUPS};
 pub use pixel_block::MAX_BLOCK_PIXELS;
 pub use tile_tracer::{CameraTracer, CulledTile, TileTracer};

@@ -7,6 +7,7 @@ use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::mirror_light::FlatMirror;
 use crate::integrator::nested_dielectrics::NestedDielectrics;
 use crate::integrator::surface_textures::SurfaceTextures;
+use crate::integrator::turned_material::TurnedMaterial;
 use crate::lights::groups::LightGroups;
 use crate::lights::on_surfaces::OnSurface;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
@@ -79,6 +80,8 @@ pub struct World<L: SimdFloat> {
     /// For each primitive, the index of its BSDF in `bsdfs`.
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
+    /// Material whose lobe is divided; `None` if there is none.
+    pub(super) turned: Option<TurnedMaterial>,
     pub(super) lights: CompiledLights<L::Scalar>,
     /// Index of the light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
@@ -157,6 +160,26 @@ impl<L: SimdFloat> World<L> {
             limits.depth = trace.max_diffuse_depth << doublings;
         }
         self.min_throughput = trace.min_throughput * 0.0625f64.powi(doublings as i32);
+    }
+
+    /// Divides the lobe of the one material that is rougher than in the world `inner` of an otherwise
+    /// equal scene: into the lobe of `inner` and the rest. Returns the share of the lobe of `inner`.
+    /// `None` if the lobes are not nested, or if paths do more than reflect.
+    pub(super) fn turn(&mut self, inner: &Self) -> Option<f64> {
+        let plain = self.nested_dielectrics.is_none() && self.diffuse_limits.is_none();
+        if !plain || self.bsdf_of != inner.bsdf_of || self.bsdfs.len() != inner.bsdfs.len() {
+            return None;
+        }
+        let divided = |(i, (own, inner)): (usize, (&Bsdf<_>, &Bsdf<_>))| {
+            own.outside(inner).map(|(rest, share)| (i, rest, share))
+        };
+        let mut divided = self.bsdfs.iter().zip(&inner.bsdfs).enumerate().filter_map(divided);
+        let (index, rest, share) = divided.next().filter(|_| divided.next().is_none())?;
+        drop(divided);
+        let parts = self.bsdfs.len() as u32;
+        self.bsdfs.extend([rest, inner.bsdfs[index]]);
+        self.turned = Some(TurnedMaterial { index: index as u32, parts, share, order: 0 });
+        Some(share)
     }
 
     /// Returns `true` if all samples of a tile with these candidates are black.

@@ -94,6 +94,9 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     if let Some(noise) = report.noise {
         parts.push(part(2, noise_part(model, report, noise.rmse.levels, theme)));
     }
+    if report.mixed {
+        parts.push(part(5, vec![dim("mixed")]));
+    }
     if let Some(error) = report.error.as_ref().filter(|_| !watching) {
         let (total, others) = error_texts(error);
         parts.push(part(4, vec![dim("error "), plain(total)]));

@@ -45,6 +45,19 @@ fn sin_cos_eighth<L: SimdFloat>(x: L) -> (L, L) {
     (x * polynomial(&SINE, x2), polynomial(&COSINE, x2))
 }
 
+/// Maps the unit square with uniform density to the part of it outside a concentric square that has
+/// the share `inner` of its area. The other warps turn both squares into concentric shapes.
+#[inline(always)]
+pub fn outside<L: SimdFloat>(u: L, v: L, inner: L) -> (L, L) {
+    let half = L::from_f64(0.5);
+    let (a, b) = (u - half, v - half);
+    // Half of the side of the concentric square through the point.
+    let far = a.abs().max(b.abs()).max(L::from_f64(1e-20));
+    let wanted = (far * far).mul_add(L::one() - inner, inner * L::from_f64(0.25)).sqrt();
+    let scale = wanted / far;
+    (a.mul_add(scale, half), b.mul_add(scale, half))
+}
+
 /// Samples a direction uniformly in the cone with half-angle theta around z. `one_minus_cos` is 1 -
 /// cos(theta), in [0, 2].
 #[inline(always)]

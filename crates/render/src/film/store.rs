@@ -298,6 +298,14 @@ impl Film {
         self.tiles[index].epoch = 0;
     }
 
+    /// Replaces the samples of tile `index` by those of the same tile of `film`.
+    pub(crate) fn copy_tile(&mut self, index: usize, film: &Self) {
+        if let Some(tile) = film.tile(index) {
+            self.tiles[index] = tile.clone();
+            self.tiles[index].epoch = self.epoch;
+        }
+    }
+
     /// Adds the samples of `tile` to tile `index`, which has the same extent.
     pub(crate) fn add_at(&mut self, index: usize, tile: Tile) {
         let ours = &mut self.tiles[index];

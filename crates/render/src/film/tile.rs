@@ -21,7 +21,7 @@ static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 ///
 /// All pixels have the same number of samples in a replicate, except during the first pass. It adds
 /// the first sample of replicate A to ever more pixels; [`Tile::lattice_px`] is its progress.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Tile {
     /// Epoch of the film when the tile was written; 0 for a new tile.
     pub(super) epoch: u64,

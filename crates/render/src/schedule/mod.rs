@@ -177,6 +177,13 @@ impl Schedule {
         }
     }
 
+    /// Lets tile `index` continue where it was in `earlier`, with its present noise estimate.
+    pub(super) fn continue_tile(&mut self, index: usize, earlier: &Self) {
+        let error = self.tiles[index].error;
+        self.tiles[index] = earlier.tiles[index].clone();
+        self.tiles[index].set_estimate(error);
+    }
+
     /// Discards all noise estimates after a change of light weights or display transform. The
     /// samples stay valid; the noise is unknown until [`Schedule::set_estimates`].
     pub fn forget_estimates(&mut self) {

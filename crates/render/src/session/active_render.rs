@@ -120,6 +120,28 @@ impl ActiveRender {
         Ok(Self { first_hit_ray_seconds, ..Self::new(state, schedule, started) })
     }
 
+    /// Shows `scene`, in which a material is rougher or as rough as before, with the samples of this
+    /// render or an earlier one. Fails with one of them if `scene` needs other samples.
+    pub fn turn(self, scene: &Arc<Scene>, options: &Options) -> Result<Self, Box<Self>> {
+        let started = Instant::now();
+        let Self { first_hit_ray_seconds, speed, first_picture_after, .. } = self;
+        let (state, schedule) = match self.state.turn(scene, options, self.schedule) {
+            Ok(turned) => turned,
+            Err(render) => {
+                let (state, schedule) = *render;
+                return Err(Box::new(Self { state, schedule, ..self }));
+            }
+        };
+        let is_base = schedule.samples > 0;
+        let mut render = Self::new(state, schedule, started);
+        (render.first_hit_ray_seconds, render.speed) = (first_hit_ray_seconds, speed);
+        if is_base {
+            render.first_picture_after = first_picture_after;
+            render.invalidate_estimates();
+        }
+        Ok(render)
+    }
+
     /// Continues the render of `checkpoint` with the lights of `scene`. Fails if the checkpoint
     /// cannot be used for this scene.
     pub fn resume(
@@ -199,11 +221,17 @@ impl ActiveRender {
     /// picture, traces the first pass and publishes a snapshot after each stage.
     pub fn trace(&mut self, wave: Wave, context: &WorkContext) {
         let flags = &context.shared;
-        if self.first_picture_after.is_some() {
+        if self.first_picture_after.is_some() || self.state.mix.is_some() {
             let wave = self.piece(wave, context);
             let start = Instant::now();
             let report = self.state.trace_wave(&wave, &context.pool, &flags.cancel_wave);
             self.complete(&wave, &report, start.elapsed());
+            if let Some(mix) = &self.state.mix {
+                mix.continue_tiles(&wave, &mut self.schedule);
+                if self.schedule.spp().min > 0 {
+                    self.first_picture_after.get_or_insert_with(|| self.started.elapsed());
+                }
+            }
             self.probe_errors(context);
             return;
         }
@@ -322,7 +350,8 @@ impl ActiveRender {
     pub fn publish(&mut self, context: &WorkContext, state: State, is_final: bool) {
         // A cancelled first pass leaves an empty film; its coarse picture has been published
         // already.
-        if !context.snapshot_wanted(is_final) || self.first_picture_after.is_none() {
+        let has_picture = self.first_picture_after.is_some() || self.state.mix.is_some();
+        if !context.snapshot_wanted(is_final) || !has_picture {
             return;
         }
         self.update_first_hits(context, f64::INFINITY);
@@ -351,6 +380,7 @@ impl ActiveRender {
             error: self.schedule.error_parts(&self.state.world.info().left_out),
             probe_seconds: self.state.probe_seconds(),
             rounding_avoided: self.rounding_avoided,
+            mixed: self.state.mix.is_some(),
             eta_seconds: self.schedule.eta_seconds(seconds),
             quality_seconds: QUALITIES
                 .map(|levels| self.schedule.seconds_to_noise(levels, seconds)),

@@ -44,6 +44,8 @@ pub struct Report {
     pub probe_seconds: [f64; 2],
     /// Error of rounding in single precision for which the render has changed to double precision.
     pub rounding_avoided: Option<f64>,
+    /// `true` if the picture contains samples of a smaller roughness.
+    pub mixed: bool,
     /// Estimated seconds left until the render ends.
     pub eta_seconds: Option<Interval>,
     /// Estimated seconds left until each of the [`QUALITIES`] is reached, whatever the stop criteria

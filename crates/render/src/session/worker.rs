@@ -157,6 +157,12 @@ impl Worker {
         {
             return;
         }
+        if !restart && let Some(work) = self.work.as_mut().ok().and_then(Option::take) {
+            match work.turn(scene, &self.options) {
+                Ok(turned) => return self.work = Ok(Some(turned)),
+                Err(work) => self.work = Ok(Some(*work)),
+            }
+        }
         #[cfg(test)]
         self.context.shared.compilations.fetch_add(1, Ordering::SeqCst);
         let previous = std::mem::replace(&mut self.work, Ok(None)).ok().flatten();

@@ -48,6 +48,8 @@ pub enum ReflectionLobe<S> {
         one_minus_cos: S,
         /// 1 - cos of the half-angle of the cone of `evaluated_roughness`.
         evaluated: S,
+        /// Share of the solid angle, around the axis, that is left out; 0 for a whole cone.
+        hole: S,
     },
     /// Directions through uniform points of a square that is perpendicular to the axis and centred
     /// on it, at distance 1.
@@ -56,6 +58,8 @@ pub enum ReflectionLobe<S> {
         side: S,
         /// Side length of the square of `evaluated_roughness`.
         evaluated: S,
+        /// Share of the area, around the centre, that is left out; 0 for a whole square.
+        hole: S,
     },
     /// Reflection and refraction at visible microfacets.
     Microfacet(MicrofacetDistribution<S>),
@@ -150,8 +154,14 @@ impl<S: Float> Bsdf<S> {
         let lobe = match material.lobe {
             Lobe::Mirror => ReflectionLobe::Mirror,
             Lobe::Cone | Lobe::Square if r == 0.0 => ReflectionLobe::Mirror,
-            Lobe::Cone => ReflectionLobe::Cone { one_minus_cos: cone(r), evaluated: cone(wide) },
-            Lobe::Square => ReflectionLobe::Square { side: side(r), evaluated: side(wide) },
+            Lobe::Cone => {
+                let (one_minus_cos, evaluated) = (cone(r), cone(wide));
+                ReflectionLobe::Cone { one_minus_cos, evaluated, hole: S::default() }
+            }
+            Lobe::Square => {
+                let (side, evaluated) = (side(r), side(wide));
+                ReflectionLobe::Square { side, evaluated, hole: S::default() }
+            }
             Lobe::Beckmann | Lobe::Ggx if material.microfacet_alpha() < SMOOTH_ALPHA => {
                 ReflectionLobe::Mirror
             }
@@ -260,15 +270,66 @@ pub(super) fn spread<L: SimdFloat>(
     axis: Vec3<L>,
     (u, v): (L, L),
 ) -> Vec3<L> {
+    let outside = |hole: &L::Scalar| {
+        if *hole > L::Scalar::default() { warp::outside(u, v, L::splat(*hole)) } else { (u, v) }
+    };
     let local = match lobe {
-        ReflectionLobe::Cone { one_minus_cos, .. } => warp::cone(u, v, L::splat(*one_minus_cos)),
-        ReflectionLobe::Square { side, .. } => warp::square(u, v, L::splat(*side)),
+        ReflectionLobe::Cone { one_minus_cos, hole, .. } => {
+            let (u, v) = outside(hole);
+            warp::cone(u, v, L::splat(*one_minus_cos))
+        }
+        ReflectionLobe::Square { side, hole, .. } => {
+            let (u, v) = outside(hole);
+            warp::square(u, v, L::splat(*side))
+        }
         ReflectionLobe::Mirror | ReflectionLobe::Microfacet(_) => return axis,
     };
     Frame::around(axis.renormalize()).to_world(local)
 }
 
+/// Returns the density [1/sr] of a lobe without the share `hole` at its centre. `pdf` is that of the
+/// whole lobe, `inner` returns that of its centre.
+#[inline(always)]
+fn outside_pdf<L: SimdFloat>(pdf: L, hole: L::Scalar, inner: impl FnOnce(f64) -> L) -> L {
+    let hole = hole.to_f64();
+    if hole == 0.0 {
+        return pdf;
+    }
+    (pdf * L::from_f64(1.0 / (1.0 - hole))).masked(inner(hole).le(L::zero()))
+}
+
 impl<S: Float> Bsdf<S> {
+    /// Returns this BSDF without the part of its lobe that the narrower lobe of `inner` covers, and
+    /// the share of that part. `None` if the lobes are not nested.
+    ///
+    /// The lobe is then `share` times that of `inner` plus `1 - share` times the returned one.
+    pub fn outside(&self, inner: &Self) -> Option<(Self, f64)> {
+        let (mut lobe, share) = (self.lobe, |inner: S, outer: S| inner.to_f64() / outer.to_f64());
+        let share = match (&mut lobe, &inner.lobe) {
+            (
+                ReflectionLobe::Cone { one_minus_cos, hole, .. },
+                ReflectionLobe::Cone { one_minus_cos: inner, .. },
+            ) => {
+                *hole = S::from_f64(share(*inner, *one_minus_cos));
+                hole.to_f64()
+            }
+            (
+                ReflectionLobe::Square { side, hole, .. },
+                ReflectionLobe::Square { side: inner, .. },
+            ) => {
+                *hole = S::from_f64(share(*inner, *side).powi(2));
+                hole.to_f64()
+            }
+            (ReflectionLobe::Microfacet(facets), ReflectionLobe::Microfacet(inner)) => {
+                let (rest, share) = facets.outside(inner)?;
+                *facets = rest;
+                share
+            }
+            _ => return None,
+        };
+        (share > 0.0 && share < 1.0).then_some((Self { lobe, ..*self }, share))
+    }
+
     /// Returns `true` if the surface has highlights.
     #[inline(always)]
     pub fn has_highlight(&self) -> bool {
@@ -377,7 +438,11 @@ impl<S: Float> Bsdf<S> {
         let vh = view.dot(h);
         let light = h * (vh + vh) - view;
         let valid = vh.gt(L::zero()) & light.z.gt(L::zero()) & view.z.gt(L::zero());
-        let weight = self.strength::<L>() * facets.shadowing(h.z, view.z, light.z, vh);
+        let mut weight = self.strength::<L>() * facets.shadowing(h.z, view.z, light.z, vh);
+        if facets.has_hole() {
+            let tan2 = (L::one() - h.z * h.z).max(L::zero()) / (h.z * h.z);
+            weight *= facets.rest(tan2, [h.z, view.z, light.z, vh]);
+        }
         BsdfSample {
             direction: frame.to_world(light).renormalize(),
             weight: self.reflection_fresnel.times(|| vh, weight).masked(valid),
@@ -406,12 +471,17 @@ impl<S: Float> Bsdf<S> {
         let mirror = incident.reflect(n);
         match &self.lobe {
             ReflectionLobe::Mirror => L::zero(),
-            ReflectionLobe::Cone { evaluated, .. } => {
-                warp::cone_pdf(mirror, direction, L::splat(*evaluated))
+            ReflectionLobe::Cone { evaluated, hole, .. } => {
+                let pdf = |size: S| warp::cone_pdf(mirror, direction, L::splat(size));
+                outside_pdf(pdf(*evaluated), *hole, |hole| {
+                    pdf(S::from_f64(evaluated.to_f64() * hole))
+                })
             }
-            ReflectionLobe::Square { evaluated, .. } => {
+            ReflectionLobe::Square { evaluated, hole, .. } => {
                 let local = Frame::around(mirror.renormalize()).to_local(direction);
-                warp::square_pdf(local, L::splat(*evaluated))
+                let pdf = |side: S| warp::square_pdf(local, L::splat(side));
+                let inner = |hole: f64| pdf(S::from_f64(evaluated.to_f64() * hole.sqrt()));
+                outside_pdf(pdf(*evaluated), *hole, inner)
             }
             ReflectionLobe::Microfacet(facets) => {
                 let h = direction - incident;
@@ -445,10 +515,13 @@ impl<S: Float> Bsdf<S> {
             Some(facets) => {
                 let nv = -incident.dot(n);
                 let (nh, tan2) = along_tan2(h, n);
-                let (visible, total) =
-                    facets.masking(nh, nv, nl, h.length_squared() * L::from_f64(0.5));
+                let vh = h.length_squared() * L::from_f64(0.5);
+                let (visible, total) = facets.masking(nh, nv, nl, vh);
                 let d = facets.density(tan2);
-                let value = d * visible * k * L::from_f64(0.25) / (nv * total);
+                let mut value = d * visible * k * L::from_f64(0.25) / (nv * total);
+                if facets.has_hole() {
+                    value *= facets.rest(tan2, [nh, nv, nl, vh]);
+                }
                 value.masked(nh.gt(L::zero()) & nv.gt(L::zero()))
             }
         };

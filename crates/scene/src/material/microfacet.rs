@@ -30,6 +30,17 @@ pub struct MicrofacetDistribution<S> {
     inverse_alpha2: S,
     /// Model of masking and shadowing.
     pub masking: Masking,
+    /// Part of the reflection lobe that is left out; `None` for a whole lobe.
+    hole: Option<Hole<S>>,
+}
+
+/// Reflection lobe of a smaller alpha that is left out of a lobe.
+#[derive(Clone, Copy, Debug)]
+struct Hole<S> {
+    alpha2: S,
+    inverse_alpha2: S,
+    /// Share of the smaller lobe in the larger one.
+    share: S,
 }
 
 /// Value of a = 1 / (alpha tan theta) from which on masking by microfacets is neglected; theta is
@@ -68,7 +79,44 @@ impl<S: Float> MicrofacetDistribution<S> {
     pub fn new(normals: FacetNormals, alpha: f64, masking: Masking) -> Self {
         let alpha2 = alpha * alpha;
         let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::from_f64);
-        Self { normals, alpha, alpha2, inverse_alpha2, masking }
+        Self { normals, alpha, alpha2, inverse_alpha2, masking, hole: None }
+    }
+
+    /// Returns this distribution, for a reflection lobe without that of `inner`, and the share that is
+    /// left out. `None` if the lobes are not nested.
+    ///
+    /// The share is the least ratio of the values of both lobes: that of D, alpha^2 / alpha'^2 at
+    /// the normal, and for Smith's masking that of G, at least alpha / alpha' at grazing angles.
+    pub(super) fn outside(&self, inner: &Self) -> Option<(Self, f64)> {
+        let ratio = inner.alpha.to_f64() / self.alpha.to_f64();
+        let share = S::from_f64(match self.masking {
+            Masking::VCavity => ratio.powi(2),
+            Masking::Smith => ratio.powi(3),
+        });
+        let alike = (self.normals, self.masking) == (inner.normals, inner.masking);
+        let Self { alpha2, inverse_alpha2, .. } = *inner;
+        let hole = Some(Hole { alpha2, inverse_alpha2, share });
+        alike.then_some((Self { hole, ..*self }, share.to_f64()))
+    }
+
+    /// Returns `true` if a part of the reflection lobe is left out.
+    #[inline(always)]
+    pub(super) fn has_hole(&self) -> bool {
+        self.hole.is_some()
+    }
+
+    /// Returns the factor of a sample or value of the reflection lobe that leaves out its hole. `tan2`
+    /// is that of [`density`](Self::density), `cosines` are those of [`masking`](Self::masking).
+    #[inline(always)]
+    pub(super) fn rest<L: SimdFloat<Scalar = S>>(&self, tan2: L, cosines: [L; 4]) -> L {
+        let Some(Hole { alpha2, inverse_alpha2, share }) = self.hole else { return L::one() };
+        let inner = Self { alpha2, inverse_alpha2, hole: None, ..*self };
+        let [nh, nv, nl, vh] = cosines;
+        let [(visible, total), (inner_visible, inner_total)] =
+            [self, &inner].map(|facets| facets.masking(nh, nv, nl, vh));
+        let g = inner_visible * total / (visible * inner_total);
+        let part = L::splat(share) * g * inner.density(tan2) / self.density(tan2);
+        (L::one() - part).max(L::zero()) * L::from_f64(1.0 / (1.0 - share.to_f64()))
     }
 
     /// Samples a microfacet normal H that is visible from the direction `view` (V). Both are in the

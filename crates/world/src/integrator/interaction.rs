@@ -24,7 +24,7 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     /// Ids of the primitives that are hit.
     pub primitive: L,
     /// Index of the BSDF in each lane, stored as an id (see [`SimdFloat::from_id`]).
-    bsdf: L,
+    pub bsdf: L,
     /// Factor of the albedo from textures and vertex colours.
     pub albedo_factor: Vec3<L>,
     /// Diffuse albedo.

@@ -19,6 +19,7 @@ mod opaque;
 pub(crate) mod path;
 pub(crate) mod surface_textures;
 mod transmission;
+pub(crate) mod turned_material;
 mod vertex;
 
 use crate::culling::tile::TileCandidates;
@@ -59,6 +60,7 @@ impl<L: SimdFloat> World<L> {
         for group in &mut out.groups[..self.info.scales.len()] {
             *group = Vec3::zero();
         }
+        out.met = [L::mask(false); path::MAX_ORDER];
         let candidates = candidates.unwrap_or(&self.culling.all_candidates);
         let integrator = Integrator { world: self, sampler, candidates, depth: self.depth };
         if let Some(limits) = self.diffuse_limits {

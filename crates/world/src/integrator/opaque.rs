@@ -38,7 +38,10 @@ impl<L: SimdFloat> Integrator<'_, L> {
             }
             active = add_background(world, path, hit.t, active, None, out);
             let Some(first) = next_distinct(hit.primitive, active) else { return };
-            let interaction = interact::<_, SIMPLE>(world, &path.ray, &hit, first, active);
+            let mut interaction = interact::<_, SIMPLE>(world, &path.ray, &hit, first, active);
+            if let Some(turned) = &world.turned {
+                turned.divide(&mut interaction, sampler, out);
+            }
             let is_last = bounce == depth;
             let mut vertex = Vertex {
                 world,

@@ -5,19 +5,29 @@ use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 use zerkalo_scene::light::Emitter;
 
+/// Largest number of reflections at the turned material of which samples of a narrower lobe are
+/// reused.
+pub const MAX_ORDER: usize = 3;
+
 /// Radiance of a packet's samples in each light group. A light with a group of its own counts as a
 /// white light of intensity 1.
-pub struct Radiance<L> {
+pub struct Radiance<L: SimdFloat> {
     /// Radiance of each light group. Elements beyond the number of groups are not in use.
     pub groups: [Vec3<L>; MAX_GROUPS],
     /// Work of all packets that were traced so far.
     pub(crate) counts: Counts,
+    /// Lanes of the packet whose paths have met the turned material once, twice, and so on.
+    pub(crate) met: [L::Mask; MAX_ORDER],
 }
 
 impl<L: SimdFloat> Radiance<L> {
     /// Returns black samples.
     pub fn black() -> Self {
-        Self { groups: [Vec3::zero(); MAX_GROUPS], counts: Counts::default() }
+        Self {
+            groups: [Vec3::zero(); MAX_GROUPS],
+            counts: Counts::default(),
+            met: [L::mask(false); MAX_ORDER],
+        }
     }
 }
 
@@ -29,6 +39,8 @@ pub struct Counts {
     /// `true` if a path sampled a glossy lobe or a point of an emitter, or chose between reflection
     /// and transmission at random.
     pub glossy: bool,
+    /// Largest number of reflections of a path by the turned material of the world, at most [`MAX_ORDER`] + 1.
+    pub meetings: u8,
 }
 
 impl Counts {
@@ -36,6 +48,15 @@ impl Counts {
     #[inline(always)]
     pub(crate) fn add_rays(&mut self, lanes: impl Mask) {
         self.rays += u64::from(lanes.bits().count_ones());
+    }
+
+    /// Returns the counts of the packets of `self` and of `other`.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            rays: self.rays + other.rays,
+            glossy: self.glossy | other.glossy,
+            meetings: self.meetings.max(other.meetings),
+        }
     }
 }
 

@@ -83,6 +83,9 @@ impl Exporter {
         picture: Option<Picture>,
         provenance: &Provenance,
     ) -> Result<Exported, String> {
+        if picture.as_ref().is_some_and(|picture| picture.report.mixed) {
+            return Err("a mix of roughnesses cannot be continued; R renders it afresh".to_string());
+        }
         let checkpoint = picture.and_then(|picture| picture.checkpoint(provenance));
         let checkpoint = checkpoint.ok_or("there are no samples to write")?;
         let write = |path: &Path| checkpoint.write(path, Existing::Refuse);
