@@ -147,11 +147,16 @@ impl Desk {
     }
 
     fn finished_picture(&mut self, scene: &Scene) -> Vec<[f64; 3]> {
-        let generation = self.session.set_scene(Arc::new(scene.clone()));
+        let mut generation = self.session.set_scene(Arc::new(scene.clone()));
         let end = Instant::now() + Duration::from_secs(60);
         while Instant::now() < end {
             let Some(snapshot) = self.session.wait(Duration::from_millis(100)) else { continue };
             let report = &snapshot.report;
+            // A mix of roughnesses is rendered afresh, as `R` does.
+            if report.mixed && report.generation == generation {
+                generation = self.session.restart();
+                continue;
+            }
             if matches!(report.state, State::Finished(_)) && report.generation == generation {
                 return self.session.with(|r, _| picture(r, Replicates::Both)).expect("a film");
             }

@@ -165,7 +165,7 @@ mod tests {
         assert_eq!(
             error,
             "cannot write out.jpeg: no picture format has the extension .jpeg; \
-             known extensions: .png, .exr"
+             known extensions: .png, .exr, .hdr"
         );
         let error = ImageOutput::from_path("picture").unwrap_err().to_string();
         assert!(error.contains("has no extension") && error.contains(".png, .exr"), "{error}");
