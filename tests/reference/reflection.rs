@@ -125,6 +125,14 @@ pub fn wide_lobe(
     }
 }
 
+/// Returns `true` if reflected rays show what the highlights of the material show, if they can hit
+/// the light.
+pub fn reflects_highlight(material: &Material) -> bool {
+    material.highlight == Highlight::CookTorrance
+        && matches!(material.lobe, Lobe::Beckmann | Lobe::Ggx)
+        && material.reflection > 0.0
+}
+
 /// Returns the highlight of a light in direction `l`: the radiance towards `v`, divided by the
 /// irradiance that a surface facing the light would receive.
 pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {

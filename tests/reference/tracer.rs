@@ -7,7 +7,7 @@ use crate::reference::emission::Shine;
 use crate::reference::lamps::Lamp;
 use crate::reference::meshes;
 use crate::reference::paint::Pixels;
-use crate::reference::reflection::{highlight, reflect, wide_lobe};
+use crate::reference::reflection::{highlight, reflect, reflects_highlight, wide_lobe};
 use crate::reference::transmission::{Way, medium};
 use std::sync::LazyLock;
 
@@ -466,6 +466,7 @@ impl<'a> Tracer<'a> {
         let ambient = if ambient { m.ambient } else { 0.0 };
         let mut sum = color * ambient * DVec3::from(self.scene.ambient.color.0);
         for (i, light) in self.scene.lights.iter().enumerate().filter(|(_, l)| l.on) {
+            let is_sized = self.lamps[i].is_some() || light.environment().is_some();
             let (towards, distance, irradiance) = match &self.lamps[i] {
                 None if light.environment().is_some() => {
                     // Uniform directions of the whole sphere.
@@ -489,7 +490,9 @@ impl<'a> Tracer<'a> {
                 continue;
             }
             let irradiance = irradiance * passed;
-            let shine = highlight(m, hit.seen, view, towards);
+            let is_reflected = light.visible && is_sized && reflects_highlight(m);
+            let shine =
+                if is_reflected { DVec3::ZERO } else { highlight(m, hit.seen, view, towards) };
             if i == 0 && self.mutation == Mutation::NoCosine {
                 cos = 1.0;
             }
@@ -520,8 +523,11 @@ impl<'a> Tracer<'a> {
             }
             let irradiance = DVec3::from(material.emitted())
                 * (passed * area * cos_there / (distance * distance));
-            let highlight = highlight(m, hit.seen, view, towards);
-            sum += irradiance * (color * (m.diffuse * cos / PI) + highlight);
+            let shine = match reflects_highlight(m) {
+                true => DVec3::ZERO,
+                false => highlight(m, hit.seen, view, towards),
+            };
+            sum += irradiance * (color * (m.diffuse * cos / PI) + shine);
         }
         sum
     }

@@ -336,6 +336,14 @@ impl<S: Float> Bsdf<S> {
         !matches!(self.specular, SpecularModel::None)
     }
 
+    /// Returns `true` if a reflected ray shows what the highlight shows: both are of the same
+    /// microfacets. The highlight is then left to lights that no reflected ray can hit.
+    pub fn reflects_highlight(&self) -> bool {
+        matches!(self.specular, SpecularModel::Microfacet { .. })
+            && matches!(self.lobe, ReflectionLobe::Microfacet(_))
+            && self.reflection.is_some()
+    }
+
     /// Returns `true` if the surface bounds a solid that absorbs light.
     pub fn absorbs(&self) -> bool {
         let absorption = self.transmission.map(|t| t.absorption.map(S::to_f64));

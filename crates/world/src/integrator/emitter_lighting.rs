@@ -295,6 +295,13 @@ impl<L: SimdFloat> Vertex<'_, L> {
         })
     }
 
+    /// Returns the lanes of `lanes` in which a light adds highlights. If it is `visible`, it adds none
+    /// where reflected rays show the same.
+    #[inline(always)]
+    pub fn highlights_beside(&self, visible: bool, lanes: L::Mask) -> L::Mask {
+        if visible { lanes.and_not(self.interaction.reflected_highlight) } else { lanes }
+    }
+
     /// Returns the BSDF [1/sr] times the cosine of the angle of incidence, weighted for multiple
     /// importance sampling, in the lanes in which `light` `arrives` at the surface. `rays` are the
     /// reflected rays that may hit the light; `None` if it is invisible to them. `weight` gets the
@@ -314,7 +321,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let mut value = Vec3::zero();
         if direct.any() {
             let pdf = cosine_pdf(cos_light);
-            value = (self.direct_value(light.wi, pdf, direct) * weight(pdf)).masked(direct);
+            let highlights = self.highlights_beside(rays.is_some(), direct);
+            value = (self.direct_value(light.wi, pdf, highlights) * weight(pdf)).masked(direct);
         }
         let Some(rays) = rays else { return value };
         let query = self.query();

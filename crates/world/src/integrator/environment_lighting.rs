@@ -96,7 +96,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let (radiance, pdf) = environment.light.radiance(wi, arrives);
         let density = cosine_pdf(cos);
         let mut value = interaction.diffuse;
-        for (index, lanes) in interaction.bsdfs(interaction.highlight_mask & arrives) {
+        let highlights = self.highlights_beside(environment.visible, interaction.highlight_mask);
+        for (index, lanes) in interaction.bsdfs(highlights & arrives) {
             let highlight = self.world.bsdfs[index].highlight(&self.query(), wi);
             value += (highlight * (L::one() / density)).masked(lanes);
         }

@@ -35,6 +35,8 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub direct_mask: L::Mask,
     /// Lanes whose BSDF has highlights.
     pub highlight_mask: L::Mask,
+    /// Lanes whose BSDF reflects rays to what its highlight shows.
+    pub reflected_highlight: L::Mask,
     /// Lanes whose BSDF has a reflection lobe.
     pub reflecting: L::Mask,
     /// Lanes whose surface no light reaches, because a coincident surface is in front of it.
@@ -114,6 +116,7 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
             has_bsdf: self.has_bsdf | other.has_bsdf,
             direct_mask: self.direct_mask | other.direct_mask,
             highlight_mask: self.highlight_mask | other.highlight_mask,
+            reflected_highlight: self.reflected_highlight | other.reflected_highlight,
             reflecting: self.reflecting | other.reflecting,
             covered: self.covered | other.covered,
         };
@@ -206,6 +209,7 @@ fn interact_one<L: SimdFloat, const SIMPLE: bool>(
         has_bsdf,
         direct_mask: lanes_if(bsdf.has_direct),
         highlight_mask: lanes_if(bsdf.has_highlight()),
+        reflected_highlight: lanes_if(bsdf.reflects_highlight()),
         reflecting: lanes_if(bsdf.reflection.is_some()),
         covered: L::mask(false),
     }

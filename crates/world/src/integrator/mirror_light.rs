@@ -151,7 +151,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let query = BsdfQuery { incident: wi, normal, fold: world.fold };
             let reflectance = bsdf.sample(&query, (zero, zero)).weight;
             let diffuse = cosine_pdf(vertex.interaction.normal.dot(wi));
-            let value = vertex.direct_value(wi, diffuse, lit).component_mul(reflectance);
+            let highlights = vertex.highlights_beside(emitter.is_some() && source.visible, lit);
+            let value = vertex.direct_value(wi, diffuse, highlights).component_mul(reflectance);
             source.emitted(vertex.unoccluded(value, light))
         });
     }
