@@ -99,6 +99,20 @@ fn roughness_mix_does_not_depend_on_threads() {
     assert!(film(1) == film(3));
 }
 
+/// Checks that tiles whose order grows late keep all their samples, and that a picture without a noise
+/// estimate is no base.
+#[test]
+fn roughness_mix_keeps_its_samples() {
+    let (smooth, rough) = (with_mirror(Lobe::Cone, 0.2), with_mirror(Lobe::Cone, 0.25));
+    let options = render_options(sobol(1));
+    assert!(render(&smooth, 1, spp_stop(2), 1).turn(&rough, &options).is_none());
+    let mut mixed = render(&smooth, 1, spp_stop(96), 1).turn(&rough, &options).unwrap();
+    while mixed.step().is_none() {
+        let film = &mixed.state.film;
+        assert!((0..film.tile_count()).all(|i| film.counts(i)[0] == film.counts(i)[1]));
+    }
+}
+
 /// Checks that a turn and its reversal cost no sample, and that a restart has no mix.
 #[test]
 fn roughness_mix_returns_to_its_base() {
@@ -123,6 +137,11 @@ fn roughness_mix_returns_to_its_base() {
     let before = finish(Some(&smooth));
     let (mixed, samples, film) = finish(Some(&rough));
     assert!(mixed && samples < before.1, "{samples} of {}", before.1);
+    let base = render(&smooth, 3, noise_stop(1.5), 1);
+    assert!(
+        film == turned(base, &rough, 3).state.film.bytes(),
+        "pieces of rounds have no influence"
+    );
     assert!(finish(Some(&smooth)) == before);
     let again = finish(Some(&rough));
     assert!(again.0 && again.2 == film);

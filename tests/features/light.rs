@@ -340,6 +340,15 @@ fn d14_mirror_light() {
             }),
         ],
     );
+    // The upper side of a solid throws the same light as a mirror without thickness.
+    let mut solid = original.clone();
+    let mirror = object(&mut solid, "mirror");
+    mirror.shape = shape("box = { center = [0.0, -0.2, 0.0], size = [0.7, 0.4, 0.7] }");
+    mirror.transform = vec![
+        TransformOp::RotateX(-(0.6f64).atan().to_degrees()),
+        TransformOp::Translate([0.0, 0.45, 1.5]),
+    ];
+    check(&original, &solid).unwrap_or_else(|e| panic!("solid: {e}"));
     // A mirror throws all light that a bounce finds in it, and nothing counts twice.
     let mut sphere = sized(lamp, [8, 6]);
     sphere.camera.eye = [0.3, 1.6, 1.0];

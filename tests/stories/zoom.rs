@@ -80,6 +80,8 @@ fn region_is_what_is_zoomed_or_selected() {
     assert_eq!((region(&desk), desk.model.zoom), (Some(zoomed), None));
     desk.keys("Alt-r");
     assert_eq!(region(&desk), None);
+    desk.keys("Z Z Z Alt-r Esc : `set size 32x24` Enter");
+    assert_eq!(region(&desk), None, "it is outside of the smaller film");
     let mut desk = rendered(8);
     let (ball, hits) =
         (Target::Object(0), desk.model.snapshot.as_ref().unwrap().first_hits.clone());

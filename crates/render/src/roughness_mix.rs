@@ -8,8 +8,9 @@
 //! count as much as the base did. Further samples have the whole lobe.
 //!
 //! A tile in which no path has met the material keeps the samples of the base; further samples follow
-//! them. A tile whose M grows is traced again from its first sample, so that its sums do not depend
-//! on the sizes of its jobs. Beyond [`MAX_ORDER`] a tile does not use the base.
+//! them. A tile whose M grows is traced again from its first sample. M is counted after each
+//! [`SAMPLE_ALIGNMENT`] samples, so that neither sums nor rays depend on the sizes of the jobs. Beyond
+//! [`MAX_ORDER`] a tile does not use the base.
 
 use crate::film::{Film, TILE};
 use crate::pass::{self, PassContext};
@@ -40,6 +41,8 @@ struct MixedTile {
     meetings: u8,
     /// Number of samples of the rest of the lobe, or in their place, in each replicate.
     ends: [u32; 2],
+    /// Number of these and of the samples of the whole lobe that follow them, in each replicate.
+    done: [u32; 2],
     /// Samples of the base in each replicate.
     base: [u32; 2],
     /// `true` if the tile continues the base.
@@ -52,9 +55,14 @@ impl MixedTile {
         usize::from(self.meetings).max(1)
     }
 
-    /// Returns `true` if a part of `job` has samples of the rest of the lobe.
-    fn has_rest(&self, job: &Job) -> bool {
-        self.order() <= MAX_ORDER && !self.continues && job.first < self.rest_end()
+    /// Returns the samples of the rest of the lobe that follow sample `first` of a job which ends at
+    /// `end`, up to the next multiple of [`SAMPLE_ALIGNMENT`]; 0 if there are none.
+    fn rest_count(&self, first: u32, end: u32) -> u32 {
+        if self.order() > MAX_ORDER || self.continues {
+            return 0;
+        }
+        let aligned = (first + 1).next_multiple_of(SAMPLE_ALIGNMENT);
+        aligned.min(end).min(self.rest_end()).saturating_sub(first)
     }
 
     /// Returns the number of samples that are traced with the rest of the lobe.
@@ -92,6 +100,12 @@ fn is_rougher(base: &Scene, scene: &Scene) -> bool {
 
 /// State and schedule of a render.
 pub type Render = (RenderState, Schedule);
+
+/// Returns `true` if all tiles have the samples of a first noise estimate. With fewer samples, a tile
+/// of a mix may still show its base.
+fn has_estimates(schedule: &Schedule) -> bool {
+    schedule.spp().min >= 2 * MIN_SAMPLES
+}
 
 /// Largest number of bases below one another.
 const MAX_BASES: usize = 3;
@@ -132,7 +146,8 @@ impl RenderState {
         let levels = |schedule: &Schedule| schedule.noise.map_or(f64::MAX, |n| n.rmse.levels);
         let deep = self.bases().count() >= MAX_BASES;
         let noise = levels(&schedule);
-        if let Some(mix) = self.mix.take_if(|mix| deep || noise > SETTLED * levels(&mix.base.1)) {
+        let noisy = |base: &Schedule| !has_estimates(&schedule) || noise > SETTLED * levels(base);
+        if let Some(mix) = self.mix.take_if(|mix| deep || noisy(&mix.base.1)) {
             (self, schedule) = mix.base;
         }
         let state = Self::mixed(scene, options, (self, schedule))?;
@@ -145,8 +160,7 @@ impl RenderState {
     fn mixed(scene: &Arc<Scene>, options: &Options, base: Render) -> Result<Self, Box<Render>> {
         let film = &base.0.film;
         let counts: Vec<_> = (0..film.tile_count()).map(|i| film.counts(i)).collect();
-        let all_sampled = counts.iter().all(|counts| !counts.contains(&0));
-        if !all_sampled || !is_rougher(base.0.scene(), scene) {
+        if !has_estimates(&base.1) || !is_rougher(base.0.scene(), scene) {
             return Err(Box::new(base));
         }
         let mut options = options.clone();
@@ -158,7 +172,7 @@ impl RenderState {
         let Some((mut state, share)) = state else { return Err(Box::new(base)) };
         let tile = |base: [u32; 2]| {
             let meetings = u8::from(base[0] != base[1]);
-            MixedTile { meetings, ends: [0; 2], base, continues: false }
+            MixedTile { meetings, ends: [0; 2], done: [0; 2], base, continues: false }
         };
         let tiles = counts.into_iter().map(tile).collect();
         (0..film.tile_count()).for_each(|i| state.film.copy_tile(i, film));
@@ -202,7 +216,7 @@ impl RoughnessMix {
     ) -> WaveReport {
         let mut tracer = Tracer { state, pool };
         let mut work = vec![None; wave.jobs.len()];
-        self.trace_rest(&mut tracer, wave, cancel, &mut work);
+        while self.trace_rest(&mut tracer, wave, cancel, &mut work) {}
         self.trace_whole(&mut tracer, wave, cancel, &mut work);
         for job in &wave.jobs {
             let tile = &mut self.tiles[job.tile as usize];
@@ -228,31 +242,38 @@ impl RoughnessMix {
         }
     }
 
-    /// Traces the parts of the jobs that have the rest of the lobe.
+    /// Returns the first sample of `job`, of replicate `r`, that is not traced; `is_begun` is `true` if
+    /// a part of the job is.
+    fn next_sample(&self, job: &Job, r: usize, is_begun: bool) -> u32 {
+        if is_begun { self.tiles[job.tile as usize].ends[r] } else { job.first }
+    }
+
+    /// Traces the next samples of the jobs, at most [`SAMPLE_ALIGNMENT`], that have the rest of the
+    /// lobe. Returns `false` if no job has more of them.
     fn trace_rest(
         &mut self,
         tracer: &mut Tracer,
         wave: &Wave,
         cancel: &AtomicBool,
         work: &mut [Option<Counts>],
-    ) {
+    ) -> bool {
         let r = wave.replicate;
+        let is_first = work.iter().all(Option::is_none);
+        let never = AtomicBool::new(false);
+        let cancel = if is_first { cancel } else { &never };
+        let part = |(i, job): (usize, &Job)| {
+            let tile = &self.tiles[job.tile as usize];
+            let first = self.next_sample(job, r, work[i].is_some());
+            let count = tile.rest_count(first, job.end());
+            let part = Job { first: first + tile.offset(), count, ..*job };
+            (count > 0 && work[i].is_some() != is_first).then_some((tile.order(), i, part))
+        };
+        let parts: Vec<_> = wave.jobs.iter().enumerate().filter_map(part).collect();
         let mut again = Vec::new();
         for order in 1..=MAX_ORDER {
-            let is_rest = |job: &Job| {
-                let tile = &self.tiles[job.tile as usize];
-                tile.order() == order && tile.has_rest(job)
-            };
-            let jobs = 0..wave.jobs.len();
             // A tile that changes its order in this loop is not traced twice.
-            let chosen: Vec<usize> =
-                jobs.filter(|i| work[*i].is_none() && is_rest(&wave.jobs[*i])).collect();
-            let part = |i: &usize| {
-                let (job, tile) = (wave.jobs[*i], &self.tiles[wave.jobs[*i].tile as usize]);
-                let end = job.end().min(tile.rest_end());
-                Job { first: job.first + tile.offset(), count: end - job.first, ..job }
-            };
-            let jobs: Vec<Job> = chosen.iter().map(part).collect();
+            let chosen: Vec<_> = parts.iter().filter(|part| part.0 == order).collect();
+            let jobs: Vec<Job> = chosen.iter().map(|part| part.2).collect();
             for job in &jobs {
                 let tile = &self.tiles[job.tile as usize];
                 if tile.meetings == 0 || tile.ends == [0; 2] {
@@ -260,7 +281,7 @@ impl RoughnessMix {
                 }
             }
             let counts = tracer.trace((r, &jobs), self.rest(order), cancel);
-            for ((i, job), counts) in chosen.into_iter().zip(&jobs).zip(counts) {
+            for ((_, i, job), counts) in chosen.into_iter().zip(counts) {
                 let index = job.tile as usize;
                 let tile = &mut self.tiles[index];
                 let film = &mut tracer.state.film;
@@ -270,14 +291,15 @@ impl RoughnessMix {
                     }
                     continue;
                 };
-                work[i] = Some(counts);
+                work[*i] = Some(work[*i].map_or(counts, |sum| sum.and(counts)));
                 let before = *tile;
-                tile.ends[r] = wave.jobs[i].first + job.count;
+                tile.ends[r] = job.first - tile.offset() + job.count;
+                tile.done[r] = tile.ends[r];
                 tile.meetings = tile.meetings.max(counts.meetings);
                 let grows = tile.order() > order || before.meetings == 0 && before.ends != [0; 2];
                 match tile.meetings {
                     0 => film.copy_tile(index, &self.base.0.film),
-                    _ if grows => again.push((i, index)),
+                    _ if grows => again.push((*i, index)),
                     _ => self.add_base(film, index, r, job.count),
                 }
             }
@@ -285,6 +307,7 @@ impl RoughnessMix {
         while !again.is_empty() {
             again = self.trace_again(tracer, &again, work);
         }
+        !parts.is_empty() && work.iter().any(Option::is_some)
     }
 
     /// Traces tiles again from their first samples. `again` has their jobs and numbers. Returns those
@@ -323,12 +346,29 @@ impl RoughnessMix {
                 work[i] = work[i].zip(counts).map(|(sum, counts)| sum.and(counts));
             }
         }
+        for r in [0, 1] {
+            let follows = |(i, index): &(usize, usize)| {
+                let tile = &self.tiles[*index];
+                tile.done[r] > tile.ends[r] && !grown.contains(&(*i, *index))
+            };
+            let chosen: Vec<(usize, usize)> = again.iter().copied().filter(follows).collect();
+            let job = |(_, index): &(usize, usize)| {
+                let MixedTile { ends, done, .. } = self.tiles[*index];
+                let first = ends[r] + self.tiles[*index].offset();
+                Job { tile: *index as u32, first, count: done[r] - ends[r] }
+            };
+            let jobs: Vec<Job> = chosen.iter().map(job).collect();
+            let counts = tracer.trace((r, &jobs), self.rest(0), &AtomicBool::new(false));
+            for ((i, _), counts) in chosen.into_iter().zip(counts) {
+                work[i] = work[i].zip(counts).map(|(sum, counts)| sum.and(counts));
+            }
+        }
         grown
     }
 
     /// Traces the parts of the jobs that have the whole lobe.
     fn trace_whole(
-        &self,
+        &mut self,
         tracer: &mut Tracer,
         wave: &Wave,
         cancel: &AtomicBool,
@@ -339,23 +379,23 @@ impl RoughnessMix {
         for (begun, cancel) in [(true, &never), (false, cancel)] {
             let selects = |i: &usize| {
                 let (job, tile) = (&wave.jobs[*i], &self.tiles[wave.jobs[*i].tile as usize]);
-                let is_rest = tile.has_rest(job);
-                let done = if work[*i].is_some() { tile.ends[wave.replicate] } else { job.first };
-                work[*i].is_some() == begun && (begun || !is_rest) && done < job.end()
+                let first = self.next_sample(job, wave.replicate, begun);
+                let is_rest = tile.rest_count(first, job.end()) > 0;
+                work[*i].is_some() == begun && !is_rest && first < job.end()
             };
             let chosen: Vec<usize> = (0..wave.jobs.len()).filter(selects).collect();
             let part = |i: &usize| {
                 let (job, tile) = (wave.jobs[*i], &self.tiles[wave.jobs[*i].tile as usize]);
-                let first = if begun { tile.ends[wave.replicate] } else { job.first };
+                let first = self.next_sample(&job, wave.replicate, begun);
                 Job { first: first + tile.offset(), count: job.end() - first, ..job }
             };
             let jobs: Vec<Job> = chosen.iter().map(part).collect();
             let counts = tracer.trace((wave.replicate, &jobs), (0, 1.0), cancel);
             for (i, counts) in chosen.into_iter().zip(counts) {
-                work[i] = match (work[i], counts) {
-                    (Some(sum), Some(counts)) => Some(sum.and(counts)),
-                    (sum, counts) => sum.or(counts),
-                };
+                let Some(counts) = counts else { continue };
+                let job = wave.jobs[i];
+                self.tiles[job.tile as usize].done[wave.replicate] = job.end();
+                work[i] = Some(work[i].map_or(counts, |sum| sum.and(counts)));
             }
         }
     }

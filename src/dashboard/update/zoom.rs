@@ -5,6 +5,7 @@ use crate::dashboard::layout::{PixelGrid, Zoom};
 use crate::dashboard::loupe::LoupeMode;
 use crate::dashboard::update::{Direction, cycled};
 use crate::dashboard::{Effect, Layout, Overlay, UpdateContext};
+use zerkalo_render::film::Window;
 use zerkalo_render::session::View;
 use zerkalo_terminal::Capabilities;
 use zerkalo_terminal::event::Mouse;
@@ -160,6 +161,11 @@ impl UpdateContext<'_> {
             (window, [0, 1].map(|i| size[i].min(window.size[i])))
         });
         let is_viewer = matches!(self.model.overlay, Some(Overlay::ViewerImage(_)));
+        // The film may have become smaller.
+        let film = self.scene().film.size.map(|n| n as usize);
+        let is_inside =
+            |region: &Window| (0..2).all(|i| region.origin[i] + region.size[i] <= film[i]);
+        self.model.region = self.model.region.filter(is_inside);
         let view = View {
             raster: Some([0, 1].map(|i| layout.texels[i].min(layout.window.size[i]))),
             window: Some(layout.window),

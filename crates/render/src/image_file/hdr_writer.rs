@@ -57,7 +57,7 @@ fn rgbe(rgb: [f64; 3]) -> [u8; 4] {
     if largest < 2f64.powi(-127) {
         return [0; 4];
     }
-    let mut exponent = (largest.log2().floor() as i32 + 1).min(127);
+    let mut exponent = (largest.log2().floor() + 1.0).min(127.0) as i32;
     if (largest * 2f64.powi(8 - exponent)).round() > 255.0 {
         exponent = (exponent + 1).min(127);
     }

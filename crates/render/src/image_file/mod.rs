@@ -1,5 +1,5 @@
-//! Image files: PNG, OpenEXR and Radiance HDR files of rendered pictures and their metadata, written row by row
-//! and read back.
+//! Image files: PNG, OpenEXR and Radiance HDR files of rendered pictures and their metadata, written
+//! row by row and read back.
 
 mod exr_header;
 mod exr_reader;

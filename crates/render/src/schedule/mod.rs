@@ -179,8 +179,8 @@ impl Schedule {
 
     /// Lets tile `index` continue where it was in `earlier`, with its present noise estimate.
     pub(super) fn continue_tile(&mut self, index: usize, earlier: &Self) {
-        let error = self.tiles[index].error;
-        self.tiles[index] = earlier.tiles[index].clone();
+        let Tile { error, rests, .. } = self.tiles[index];
+        self.tiles[index] = Tile { rests, ..earlier.tiles[index].clone() };
         self.tiles[index].set_estimate(error);
     }
 

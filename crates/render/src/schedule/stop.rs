@@ -14,6 +14,10 @@ const FEW_PIXELS_TO_STOP: f64 = 64.0;
 /// Largest error of a picture, as a share of the target, that is due to one pixel at the edge of a
 /// lamp in which no sample has hit the lamp.
 const SLIVER_ERROR: f64 = 0.25;
+/// Samples per pixel and replicate up to which a render waits for a sample that hits the lamp. Only one
+/// in 2048 pixels at an edge has a smaller share of the lamp. A lamp a million times as bright as white
+/// would otherwise need millions of samples.
+const SLIVER_SAMPLES: u32 = 1024;
 
 impl Schedule {
     /// Estimates the seconds left until the first stop criterion is reached, after `seconds` seconds
@@ -142,7 +146,7 @@ impl Schedule {
 
     /// Returns the numbers of the tiles below their cap whose
     /// [`TileNoise::sliver`](crate::film::TileNoise::sliver) is above [`SLIVER_ERROR`]. There are none
-    /// in uniform pictures, and without an error target in levels.
+    /// with [`SLIVER_SAMPLES`], in uniform pictures, and without an error target in levels.
     pub(super) fn tiles_with_slivers(&self) -> impl Iterator<Item = usize> {
         let is_counted = |criterion| self.settings.adaptive && criterion == Criterion::Levels;
         let target = self.target().filter(|(criterion, _)| is_counted(*criterion));
@@ -150,7 +154,7 @@ impl Schedule {
         let largest = 3.0 * self.pixels() as f64 * rmse * rmse;
         let has_sliver = move |tile: &Tile| {
             tile.error.is_some_and(|error| f64::from(error.sliver) > largest)
-                && tile.done < self.cap(tile)
+                && tile.done < self.cap(tile).min(SLIVER_SAMPLES)
         };
         (0..self.tiles.len()).filter(move |tile| has_sliver(&self.tiles[*tile]))
     }

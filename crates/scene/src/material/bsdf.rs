@@ -148,6 +148,7 @@ impl<S: Float> Bsdf<S> {
             Highlight::CookTorrance => SpecularModel::Microfacet { strength, facets },
         };
         let r = material.roughness;
+        let hole = S::default();
         let wide = evaluated_roughness::<S>(r);
         let cone = |r| S::from_f64(one_minus_cos_of_tan(r));
         let side = |r| S::from_f64(std::f64::consts::PI.sqrt() * r);
@@ -155,13 +156,9 @@ impl<S: Float> Bsdf<S> {
             Lobe::Mirror => ReflectionLobe::Mirror,
             Lobe::Cone | Lobe::Square if r == 0.0 => ReflectionLobe::Mirror,
             Lobe::Cone => {
-                let (one_minus_cos, evaluated) = (cone(r), cone(wide));
-                ReflectionLobe::Cone { one_minus_cos, evaluated, hole: S::default() }
+                ReflectionLobe::Cone { one_minus_cos: cone(r), evaluated: cone(wide), hole }
             }
-            Lobe::Square => {
-                let (side, evaluated) = (side(r), side(wide));
-                ReflectionLobe::Square { side, evaluated, hole: S::default() }
-            }
+            Lobe::Square => ReflectionLobe::Square { side: side(r), evaluated: side(wide), hole },
             Lobe::Beckmann | Lobe::Ggx if material.microfacet_alpha() < SMOOTH_ALPHA => {
                 ReflectionLobe::Mirror
             }
@@ -325,7 +322,13 @@ impl<S: Float> Bsdf<S> {
                 *facets = rest;
                 share
             }
-            _ => return None,
+            (
+                ReflectionLobe::Mirror
+                | ReflectionLobe::Cone { .. }
+                | ReflectionLobe::Square { .. }
+                | ReflectionLobe::Microfacet(_),
+                _,
+            ) => return None,
         };
         (share > 0.0 && share < 1.0).then_some((Self { lobe, ..*self }, share))
     }

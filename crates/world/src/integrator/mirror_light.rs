@@ -20,6 +20,10 @@ use zerkalo_scene::material::BsdfQuery;
 /// First salt of the random numbers for lights in mirrors.
 const MIRROR_SALT: u32 = 1 << 28;
 
+/// Largest distance of the hit of a ray to a point of a mirror, as a multiple of that of the point. A
+/// ray beside one face of a solid may hit another one behind it.
+const FARTHEST_HIT: f64 = 1.001;
+
 /// Flat face of a clear mirror that throws light.
 pub(crate) struct FlatMirror<S> {
     primitive: u32,
@@ -133,7 +137,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         self.out.counts.add_rays(lit);
         let ray = Ray { origin: self.shadow_origin::<false>(), direction: wi };
         let hit = world.geometry.closest_masked(&ray, world.geometry.all(), lit);
-        let lit = lit & hit.t.lt(L::from_f64(L::MAX)) & hit.primitive.id_eq(mirror.primitive);
+        let farthest = near.mul_add(L::from_f64(FARTHEST_HIT), L::splat(mirror.lift));
+        let lit = lit & hit.t.lt(farthest) & hit.primitive.id_eq(mirror.primitive);
         let shadow = |vertex: &Self, lit| {
             let ray =
                 Ray { origin: normal.mul_add(L::splat(mirror.lift), point), direction: light.wi };

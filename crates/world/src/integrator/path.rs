@@ -39,7 +39,8 @@ pub struct Counts {
     /// `true` if a path sampled a glossy lobe or a point of an emitter, or chose between reflection
     /// and transmission at random.
     pub glossy: bool,
-    /// Largest number of reflections of a path by the turned material of the world, at most [`MAX_ORDER`] + 1.
+    /// Largest number of reflections of a path by the turned material of the world, at most
+    /// [`MAX_ORDER`] + 1.
     pub meetings: u8,
 }
 

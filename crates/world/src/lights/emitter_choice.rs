@@ -1,6 +1,7 @@
 //! Choice of emitters by importance, in scenes with many of them.
 //!
-//! Emitters of one light group, and those of all groups with several lights, form a binary tree: consecutive ones in the order of a Morton curve.
+//! Emitters of one light group, and those of all groups with several lights, form a binary tree:
+//! consecutive ones in the order of a Morton curve.
 //! The scene is divided into cells. Each cell has a list of *clusters*, which are subtrees that
 //! together contain every emitter once, and a table of *slots*, whose number is a power of two. A
 //! cluster has slots in proportion to its importance for the cell: its power, its distance, and the
