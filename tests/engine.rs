@@ -23,7 +23,6 @@ mod lobes;
 mod mesh_scenes;
 mod random_scenes;
 mod reference;
-mod roughness_mix;
 mod scenes;
 mod serving;
 mod shards;

@@ -18,6 +18,7 @@ mod mesh;
 mod mutations;
 mod paths;
 mod program;
+mod roughness_mix;
 mod shapes;
 mod shards;
 mod table;

@@ -2,6 +2,9 @@
 //! leave all others equal in every bit.
 
 use super::*;
+use ratatui::buffer::{Buffer, Cell};
+use ratatui::layout::Rect;
+use zerkalo::dashboard::view::View;
 use zerkalo_render::FirstHitBuffer;
 use zerkalo_render::film::Window;
 
@@ -67,4 +70,41 @@ fn roughness_changes_only_pixels_of_the_mirror() {
     println!("{blurred} of {} reflections of objects changed", reflections.len());
     assert!(reflections.len() > 300, "{}", reflections.len());
     assert!(10 * blurred >= 9 * reflections.len(), "{blurred} of {}", reflections.len());
+}
+
+/// Checks that `]`, also held, begins with the samples of the smoother mirror, that `[` shows its picture
+/// again, that `R` renders afresh, and that the screen says which picture is mixed.
+#[test]
+fn rougher_mirror_begins_with_samples_of_the_smoother_one() {
+    let mut desk = Desk::new(ROOM);
+    let mut session = new_session(2, 1, spp_stop(16), false);
+    let mut shows_mixed = |keys: &str| {
+        let mut generation = 0;
+        for key in keys.split(' ') {
+            desk.effects.clear();
+            desk.keys(key);
+            generation = match desk.asked(|effect| *effect == Effect::Restart) {
+                true => session.restart(),
+                false => session.set_scene(Arc::clone(desk.model.scene())),
+            };
+        }
+        loop {
+            let snapshot = session.wait(Duration::from_secs(60)).expect("a snapshot in time");
+            let report = &snapshot.report;
+            let finished = matches!(report.state, State::Finished(_));
+            if finished && report.generation == generation {
+                let mixed = report.mixed;
+                desk.send(Message::Snapshot(Box::new(snapshot)));
+                let mut screen = Buffer::empty(Rect::new(0, 0, 120, 36));
+                View::default().draw(&desk.model, &mut screen);
+                let text: String = screen.content().iter().map(Cell::symbol).collect();
+                assert_eq!(text.contains("mixed"), mixed, "{text}");
+                return mixed;
+            }
+        }
+    };
+    assert!(!shows_mixed(""), "the first picture");
+    assert!(shows_mixed("] ] ]"), "a rougher mirror");
+    assert!(!shows_mixed("[ [ ["), "the first picture again");
+    assert!(shows_mixed("]") && !shows_mixed("R"), "rendered afresh");
 }

@@ -1,39 +1,15 @@
 //! Renders that begin with the picture of a smaller roughness: they agree with fresh renders, their
 //! errors are honest, and they do not depend on threads or pieces.
 
+use crate::features::row::*;
 use crate::harness::*;
 use zerkalo_render::SyncRender;
 
-/// A rough mirror that reflects itself by way of a ball, a lamp with a size, and a floor that meets no
-/// mirror.
-const SCENE: &str = r#"
-film.size = [64, 48]
-camera = { eye = [0.0, 1.2, 4.0], target = [0.0, 0.7, 0.0] }
-ambient.color = [0.05, 0.05, 0.1]
-background.color = [0.1, 0.2, 0.3]
-materials.red = { color = [0.8, 0.2, 0.1], reflection = 0.3, roughness = 0.05 }
-materials.mirror = { diffuse = 0.1, reflection = 0.8, roughness = 0.2 }
-materials.floor = { color = [0.7, 0.7, 0.6] }
-[[light]]
-name = "lamp"
-sphere = { center = [-1.0, 1.2, 0.2], radius = 0.2 }
-intensity = 3.0
-[[light]]
-point = { position = [2.0, 4.0, 3.0] }
-[[object]]
-material = "red"
-shape.sphere = { center = [0.3, 0.5, 0.0], radius = 0.5 }
-[[object]]
-material = "floor"
-shape.platform = { center = [0.0, 0.0, 0.0], size = [6.0, 6.0] }
-[[object]]
-material = "mirror"
-shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0, 0.0, 1.0] }
-"#;
+const SIZE: [u32; 2] = [64, 48];
 
 fn with_mirror(lobe: Lobe, roughness: f64) -> Scene {
-    let mut scene = parsed(SCENE);
-    let mirror = scene.materials.get_mut("mirror").unwrap();
+    let mut scene = sized(shipped("roughness-mix.toml"), SIZE);
+    let mirror = material(&mut scene, "mirror");
     (mirror.lobe, mirror.roughness) = (lobe, roughness);
     scene
 }
@@ -52,40 +28,63 @@ fn turned(render: SyncRender, scene: &Scene, seed: u64) -> SyncRender {
     finished(render.turn(scene, &render_options(sobol(seed))).expect("samples are reused"))
 }
 
-/// Compares means of blocks over many seeds. Student's t of 22 degrees of freedom exceeds 5.5 once in
-/// 60,000 values; each lobe has 576.
-#[test]
-fn roughness_mix_agrees_with_fresh_renders() {
-    const SEEDS: u64 = 12;
-    let blocks = |render: &SyncRender| {
-        let mut sums = vec![0.0; 16 * 12 * 3];
-        for (i, pixel) in picture(&render.state, Replicates::Both).iter().enumerate() {
-            let block = i / 64 / 4 * 16 + i % 64 / 4;
-            (0..3).for_each(|c| sums[3 * block + c] += pixel[c] / 16.0);
-        }
-        sums
+/// Renders of a lobe that are compared, each with another seed.
+const SEEDS: u64 = 12;
+
+/// Returns means of blocks.
+fn blocks(render: &SyncRender) -> Vec<f64> {
+    let mut sums = vec![0.0; 16 * 12 * 3];
+    for (i, pixel) in picture(&render.state, Replicates::Both).iter().enumerate() {
+        let block = i / 64 / 4 * 16 + i % 64 / 4;
+        (0..3).for_each(|c| sums[3 * block + c] += pixel[c] / 16.0);
+    }
+    sums
+}
+
+/// Compares means of blocks over all seeds: `fresh`, and renders of `scene` that begin with the picture
+/// of `base`. Student's t of 22 degrees of freedom exceeds 5.5 once in 60,000 values; each lobe has 576.
+fn begins_with(base: &Scene, scene: &Scene, fresh: &[Vec<f64>]) -> Verdict {
+    let scene = sized(scene.clone(), SIZE);
+    let mut mixed = Vec::new();
+    for seed in 0..SEEDS {
+        let turned = render(base, seed, spp_stop(32), 1).turn(&scene, &render_options(sobol(seed)));
+        mixed.push(blocks(&finished(turned.ok_or("no samples are reused")?)));
+    }
+    let n = SEEDS as f64;
+    let moments = |all: &[Vec<f64>], i: usize| {
+        let mean = all.iter().map(|b| b[i]).sum::<f64>() / n;
+        (mean, all.iter().map(|b| (b[i] - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
     };
+    let z = |i| {
+        let ((a, var_a), (b, var_b)) = (moments(&mixed, i), moments(fresh, i));
+        if var_a + var_b > 0.0 { (a - b) / (var_a + var_b).sqrt() } else { 0.0 }
+    };
+    let z: Vec<f64> = (0..mixed[0].len()).map(z).collect();
+    let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
+    let worst = z.iter().fold(0.0, |worst: f64, z| worst.max(z.abs()));
+    ensure(worst < 5.5 && rms < 1.15, || format!("worst z {worst:.2}, rms {rms:.2}"))
+}
+
+#[test]
+fn d16_roughness_mix() {
     for lobe in [Lobe::Cone, Lobe::Square, Lobe::Ggx, Lobe::Beckmann] {
         let (smooth, rough) = (with_mirror(lobe, 0.2), with_mirror(lobe, 0.25));
-        let (mut mixed, mut fresh) = (Vec::new(), Vec::new());
-        for seed in 0..SEEDS {
-            let base = render(&smooth, seed, spp_stop(32), 1);
-            mixed.push(blocks(&turned(base, &rough, seed)));
-            fresh.push(blocks(&render(&rough, seed + 1000, spp_stop(32), 1)));
+        let seeds = 1000..1000 + SEEDS;
+        let fresh = seeds.map(|seed| blocks(&render(&rough, seed, spp_stop(32), 1)));
+        let fresh: Vec<_> = fresh.collect();
+        if lobe != Lobe::Cone {
+            begins_with(&smooth, &rough, &fresh).unwrap_or_else(|e| panic!("{lobe:?}: {e}"));
+            continue;
         }
-        let n = SEEDS as f64;
-        let moments = |all: &[Vec<f64>], i: usize| {
-            let mean = all.iter().map(|b| b[i]).sum::<f64>() / n;
-            (mean, all.iter().map(|b| (b[i] - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
-        };
-        let z = |i| {
-            let ((a, var_a), (b, var_b)) = (moments(&mixed, i), moments(&fresh, i));
-            if var_a + var_b > 0.0 { (a - b) / (var_a + var_b).sqrt() } else { 0.0 }
-        };
-        let z: Vec<f64> = (0..mixed[0].len()).map(z).collect();
-        let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
-        let worst = z.iter().fold(0.0, |worst: f64, z| worst.max(z.abs()));
-        assert!(worst < 5.5 && rms < 1.15, "{lobe:?}: worst z {worst:.2}, rms {rms:.2}");
+        row(
+            "roughness-mix.toml",
+            |tested| begins_with(&smooth, tested, &fresh),
+            &[
+                ("a smaller step", &|s| material(s, "mirror").roughness = 0.22),
+                ("a larger one", &|s| material(s, "mirror").roughness = 0.3),
+                ("another lobe", &|s| material(s, "mirror").lobe = Lobe::Square),
+            ],
+        );
     }
 }
 
