@@ -45,7 +45,10 @@ pub fn mesh(name: &str, polygons: &[Vec<DVec3>]) -> String {
         }
         faces += "\n";
     }
-    fs::write(&path, vertices + &faces).unwrap();
+    // Another test may read the file at the same time.
+    let draft = folder.join(format!("{name}-{:?}", std::thread::current().id()));
+    fs::write(&draft, vertices + &faces).unwrap();
+    fs::rename(&draft, &path).unwrap();
     format!("shape.mesh = {{ file = {:?}, normals = \"flat\" }}", path.to_str().unwrap())
 }
 

@@ -68,8 +68,9 @@ and every key with a default may be left out. Unknown keys are errors.
 - A sphere, rectangle or disk light is a radiating surface without a body: rays pass through it, it
   casts no shadow, and it vanishes when it is switched off. An object behind or inside it is its
   housing; on an object's surface it shines outwards. Camera and reflected rays see it unless `visible
-  = false`. `specular` highlights show it as well, so that a material with both `specular` and
-  `reflection` shows it twice: leave `specular` out for the plain reflection.
+  = false`. A Cook-Torrance highlight and a microfacet lobe are the same reflection: a material with both
+  shows such a light once, and lights without a size as highlights. Any other material with both
+  `specular` and `reflection` shows it twice: leave `specular` out for the plain reflection.
 - With `unit = \"radiance\"` the intensity of such a light is its radiance [W/(sr m\u{b2})]: a light of
   intensity 1 is white in the picture. With `unit = \"power\"` it is the emitted power [W], pi x
   radiance x area. The area is that of the side that shines, or of the whole sphere.
