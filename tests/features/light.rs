@@ -356,6 +356,7 @@ fn d14_mirror_light() {
     let ball = SphereLight { center: [-0.1, 2.5, 2.7], radius: 0.12 };
     sphere.lights[0] = Light { intensity: 30.0, ..Light::new(ball) };
     sphere.trace.max_diffuse_depth = 1;
+    sphere.trace.caustics = true;
     let mut without_caustics = sphere.clone();
     without_caustics.trace.caustics = false;
     means_agree("lamp in a mirror", &sphere, &without_caustics, 2048);
