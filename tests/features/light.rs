@@ -353,6 +353,7 @@ fn d14_mirror_light() {
     let mut sphere = sized(lamp, [8, 6]);
     sphere.camera.eye = [0.3, 1.6, 1.0];
     sphere.camera.target = Some([0.2, 0.4, -3.0]);
+    sphere.camera.view_angle = ViewAngle::Vertical(12.0);
     let ball = SphereLight { center: [-0.1, 2.5, 2.7], radius: 0.12 };
     sphere.lights[0] = Light { intensity: 30.0, ..Light::new(ball) };
     sphere.trace.max_diffuse_depth = 1;
