@@ -2,7 +2,7 @@
 
 use crate::dashboard::pictures::KeptPicture;
 use crate::dashboard::update::{Coalesce, Direction, cycled};
-use crate::dashboard::{DisplayChannel, Effect, Mode, PickEntry, UpdateContext};
+use crate::dashboard::{DisplayChannel, Effect, Focus, Mode, PickEntry, UpdateContext};
 use std::time::Duration;
 use zerkalo_render::session::State;
 use zerkalo_scene::Tone;
@@ -225,6 +225,10 @@ impl UpdateContext<'_> {
         let current = |channel: &DisplayChannel| *channel == self.model.channel;
         self.model.channel = *cycled(&DisplayChannel::COMPARISONS, current, 1);
         self.repaint();
+        if self.model.channel == DisplayChannel::Wipe {
+            // The arrow keys are those of the border.
+            self.model.focus = Focus::Picture;
+        }
         self.say(match self.model.channel {
             DisplayChannel::Wipe => "pinned | live: Left, Right or a drag moves the border",
             channel => channel.name(),
